@@ -1,0 +1,49 @@
+# One library a folder: add_module(NAME DEPENDS module... PACKAGES target...).
+# Every *.cpp beside the CMakeLists.txt belongs to it, but *_test.cpp, which make one test program.
+# tools/check_layers.sh compares the includes with DEPENDS.
+
+find_package(PkgConfig REQUIRED)
+find_package(TBB REQUIRED)
+find_package(fmt REQUIRED)
+find_package(GTest REQUIRED)
+
+add_library(pietra_options INTERFACE)
+# Bytes of a model must not depend on the machine: no contraction of multiply-add, no fast-math.
+target_compile_options(pietra_options INTERFACE -Wall -Wextra -Wconversion -Wno-sign-conversion
+                                                -ffp-contract=off)
+if(PIETRA_WERROR)
+    target_compile_options(pietra_options INTERFACE -Werror)
+endif()
+if(PIETRA_SANITIZE)
+    target_compile_options(pietra_options INTERFACE -fsanitize=${PIETRA_SANITIZE}
+                                                    -fno-omit-frame-pointer -g)
+    target_link_options(pietra_options INTERFACE -fsanitize=${PIETRA_SANITIZE})
+endif()
+if(PIETRA_FUZZ)
+    target_compile_options(pietra_options INTERFACE -fsanitize=fuzzer-no-link,address,undefined -g)
+    target_link_options(pietra_options INTERFACE -fsanitize=address,undefined)
+endif()
+target_include_directories(pietra_options INTERFACE ${CMAKE_SOURCE_DIR}/src)
+
+function(add_module name)
+    cmake_parse_arguments(M "" "" "DEPENDS;PACKAGES" ${ARGN})
+    file(GLOB sources CONFIGURE_DEPENDS *.cpp)
+    set(tests ${sources})
+    list(FILTER sources EXCLUDE REGEX "_test\\.cpp$")
+    list(FILTER tests INCLUDE REGEX "_test\\.cpp$")
+    list(TRANSFORM M_DEPENDS PREPEND pietra_)
+    if(sources)
+        add_library(pietra_${name} STATIC ${sources})
+        set(scope PUBLIC)
+    else()
+        add_library(pietra_${name} INTERFACE)
+        set(scope INTERFACE)
+    endif()
+    target_link_libraries(pietra_${name} ${scope} pietra_options ${M_DEPENDS} ${M_PACKAGES})
+    if(tests)
+        add_executable(${name}_test ${tests})
+        target_link_libraries(${name}_test PRIVATE pietra_${name} GTest::gtest_main)
+        add_test(NAME ${name} COMMAND ${name}_test)
+        set_tests_properties(${name} PROPERTIES TIMEOUT 300)
+    endif()
+endfunction()
