@@ -81,24 +81,25 @@ CellPath cellPath(const Vec3i& p, int scale, int level) {
     return bits << (61 - level);
 }
 
-void barycentrePaths(std::span<const Vec3i> sums, std::span<CellPath> paths) {
-    CHECK_EQ(sums.size(), paths.size());
+void cellPaths(std::span<const Vec3i> points, int scale, std::span<CellPath> paths, int level) {
+    CHECK_EQ(points.size(), paths.size());
     static_assert(kMaxCellLevel % 3 == 0);
-    constexpr int kRounds = kMaxCellLevel / 3, kRoundsAWord = 10;
-    for (size_t begin = 0; begin < sums.size(); begin += kLanes) {
-        const size_t count = std::min(size_t(kLanes), sums.size() - begin);
+    constexpr int kRoundsAWord = 10;
+    const int rounds = (level + 2) / 3;
+    for (size_t begin = 0; begin < points.size(); begin += kLanes) {
+        const size_t count = std::min(size_t(kLanes), points.size() - begin);
         Lanes s{};
         uint64_t result[kLanes] = {};
         for (size_t k = 0; k < count; ++k) {
-            const Vec3i& p = sums[begin + k];
+            const Vec3i& p = points[begin + k];
             const int root = rootOf(p);
             const auto& axes = kAxes[size_t(root)];
             s.x1[k] = p[axes[0]], s.x2[k] = p[axes[1]], s.x3[k] = p[axes[2]];
-            s.edge[k] = 3 << kLatticeBits;
+            s.edge[k] = scale << kLatticeBits;
             result[k] = uint64_t(root);
         }
-        for (int round = 0; round < kRounds;) {
-            const int end = std::min(round + kRoundsAWord, kRounds);
+        for (int round = 0; round < rounds;) {
+            const int end = std::min(round + kRoundsAWord, rounds);
             const int fresh = 3 * (end - round);
             for (; round < end; ++round) bisectThrice(s);
             for (int k = 0; k < kLanes; ++k) {
@@ -106,7 +107,7 @@ void barycentrePaths(std::span<const Vec3i> sums, std::span<CellPath> paths) {
                 s.bits[k] = 0;
             }
         }
-        for (size_t k = 0; k < count; ++k) paths[begin + k] = result[k] << (61 - kMaxCellLevel);
+        for (size_t k = 0; k < count; ++k) paths[begin + k] = result[k] << (61 - 3 * rounds);
     }
 }
 

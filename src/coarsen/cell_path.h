@@ -55,8 +55,9 @@ inline bool cellContains(CellId outer, CellId inner) {
 /// small number (3 for a barycentre given as the sum of three corners).
 CellPath cellPath(const Vec3i& p, int scale, int level = kMaxCellLevel);
 
-/// Paths of many barycentres, given as the sums of three corners each, to the full depth.
-void barycentrePaths(std::span<const Vec3i> sums, std::span<CellPath> paths);
+/// Paths of many points p / scale, to `level` rounded up to a multiple of three.
+void cellPaths(std::span<const Vec3i> points, int scale, std::span<CellPath> paths,
+               int level = kMaxCellLevel);
 
 /// The four corners, in the order that the bisection rule keeps.
 std::array<Vec3i, 4> cellCorners(CellId cell);

@@ -51,7 +51,7 @@ TEST(CellPath, manyAtOnceEqualOneByOne) {
     sums[1] = Vec3i(3 << kLatticeBits);
     sums[2] = {3 << 20, 3 << 20, 3 << 20};
     std::vector<CellPath> paths(sums.size());
-    barycentrePaths(sums, paths);
+    cellPaths(sums, 3, paths);
     for (size_t i = 0; i < sums.size(); ++i) EXPECT_EQ(paths[i], cellPath(sums[i], 3)) << i;
 }
 
