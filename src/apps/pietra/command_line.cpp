@@ -83,7 +83,7 @@ std::string suggestion(std::string_view word, const std::vector<std::string>& kn
     size_t best_distance = 3;
     for (const std::string& candidate : known) {
         const size_t distance = editDistance(word, candidate);
-        if (distance < best_distance && distance < candidate.size() / 2) {
+        if (distance < best_distance && 2 * distance < candidate.size()) {
             best_distance = distance;
             best = &candidate;
         }
@@ -126,6 +126,7 @@ Parser::Parser(const VerbTable& verbs, CommonOptions& common) : verbs_(verbs) {
     std::erase_if(program_.bound, [&](const BoundOption& b) { return b.parsed == config; });
     app_.remove_option(config);
     app_.set_config("--config");
+    app_.allow_config_extras(CLI::config_extras_mode::error);
 
     bound_.reserve(verbs.size());
     for (const auto& verb : verbs) {
@@ -160,7 +161,8 @@ std::string Parser::helpPage() const {
 }
 
 void Parser::refuseExtras(const std::vector<std::string>& arguments) const {
-    const std::vector<std::string> extras = app_.remaining(true);
+    std::vector<std::string> extras = app_.remaining(true);
+    std::erase(extras, "--");
     if (extras.empty()) return;
     const BoundApp* target = chosen();
     // note: CLI11 lists what the program did not take before what the verb did not take.
