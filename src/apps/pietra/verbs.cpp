@@ -4,6 +4,7 @@ namespace pietra {
 
 VerbTable makeVerbs() {
     VerbTable verbs;
+    verbs.push_back(makeBuildVerb());
     return verbs;
 }
 

@@ -10,6 +10,8 @@ namespace pietra {
 
 using VerbTable = std::vector<std::unique_ptr<Verb>>;
 
+std::unique_ptr<Verb> makeBuildVerb();
+
 /// All verbs, in the order in which the help page lists them.
 VerbTable makeVerbs();
 
