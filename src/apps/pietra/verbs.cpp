@@ -1,0 +1,10 @@
+#include "apps/pietra/verbs.h"
+
+namespace pietra {
+
+VerbTable makeVerbs() {
+    VerbTable verbs;
+    return verbs;
+}
+
+}  // namespace pietra

@@ -1,0 +1,16 @@
+#pragma once
+// The table of verbs. A verb is one verb_*.cpp with a maker, declared here and listed in verbs.cpp.
+
+#include <memory>
+#include <vector>
+
+#include "apps/pietra/verb.h"
+
+namespace pietra {
+
+using VerbTable = std::vector<std::unique_ptr<Verb>>;
+
+/// All verbs, in the order in which the help page lists them.
+VerbTable makeVerbs();
+
+}  // namespace pietra

@@ -1,0 +1,28 @@
+#pragma once
+// The cameras that `--view NAME` means: from the front, the back, the left, the right, the top, the
+// bottom, or a corner (iso), so that a whole box is in the picture. Pure functions.
+
+#include <optional>
+#include <string_view>
+
+#include "multires/view.h"
+
+namespace pietra {
+
+enum class StandardView { kFront, kBack, kLeft, kRight, kTop, kBottom, kIso };
+enum class UpAxis { kY, kZ };
+
+/// "front", "back", "left", "right", "top", "bottom", "iso"; empty on anything else.
+std::optional<StandardView> parseStandardView(std::string_view name);
+
+/// With z up, `front` looks along +y, `left` stands on the side of -x and looks along +x, `top`
+/// looks along -z with +y upwards in the picture, `iso` looks from the right, the front and above.
+/// With y up all this is turned about x by a quarter: `front` looks along -z, as in glTF.
+///
+/// The camera looks at the centre of `box`, from the least distance at which all of it lies inside
+/// the picture, with a margin of 1/20 of the picture's half sides. `box` in input coordinates, not
+/// empty; one that is a single point is looked at from a distance of 1.
+Camera standardCamera(StandardView view, UpAxis up_axis, const Box3d& box, const PictureSize& size,
+                      double fovy_deg = 45);
+
+}  // namespace pietra

@@ -1,0 +1,29 @@
+#include "runtime/camera_path.h"
+
+#include <algorithm>
+
+#include "base/check.h"
+
+namespace pietra {
+
+Camera CameraPath::at(double t) const {
+    CHECK(!keys.empty());
+    const auto after = std::upper_bound(keys.begin(), keys.end(), t,
+                                        [](double time, const Key& key) { return time < key.t; });
+    if (after == keys.begin()) return keys.front().camera;
+    if (after == keys.end()) return keys.back().camera;
+    const Key& before = after[-1];
+    const double s = (t - before.t) / (after->t - before.t);
+    const auto mix = [s](const auto& a, const auto& b) { return a * (1 - s) + b * s; };
+    const Camera& a = before.camera;
+    const Camera& b = after->camera;
+    return {mix(a.eye, b.eye), mix(a.target, b.target), mix(a.up, b.up),
+            mix(a.fovy_deg, b.fovy_deg)};
+}
+
+Camera CameraPath::frame(int i, int frames) const {
+    CHECK(i >= 0 && i < frames);
+    return at(frames == 1 ? 0 : seconds * i / (frames - 1));
+}
+
+}  // namespace pietra
