@@ -5,6 +5,7 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_pipeline.h>
 
 #include <cstddef>
 #include <memory>
@@ -39,6 +40,26 @@ void parallelForSlices(size_t count, size_t grain, Body&& body) {
                           body(range.begin(), range.end());
                       },
                       tbb::simple_partitioner());
+}
+
+/// produce(i) in parallel for i of [0, count); consume(result) for one at a time, in the order of i. At
+/// most `in_flight` results exist at a time.
+template <class Produce, class Consume>
+void orderedPipeline(size_t count, size_t in_flight, Produce&& produce, Consume&& consume) {
+    using Result = decltype(produce(size_t(0)));
+    size_t next = 0;
+    tbb::parallel_pipeline(
+        in_flight, tbb::make_filter<void, size_t>(tbb::filter_mode::serial_in_order,
+                                                  [&](tbb::flow_control& control) {
+                                                      if (next == count) control.stop();
+                                                      return next < count ? next++ : size_t(0);
+                                                  }) &
+                       tbb::make_filter<size_t, std::shared_ptr<Result>>(
+                           tbb::filter_mode::parallel,
+                           [&](size_t i) { return std::make_shared<Result>(produce(i)); }) &
+                       tbb::make_filter<std::shared_ptr<Result>, void>(
+                           tbb::filter_mode::serial_in_order,
+                           [&](const std::shared_ptr<Result>& result) { consume(*result); }));
 }
 
 /// Scratch space, one instance a thread, kept between tasks.

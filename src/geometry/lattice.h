@@ -30,6 +30,12 @@ struct Lattice {
     double vertexStep() const { return step * double(1 << shift); }
 };
 
+/// How fine the lattice is to be.
+struct PrecisionSetting {
+    enum class Kind { kAuto, kFinest, kStep } kind = Kind::kAuto;
+    double step = 0;  ///< kStep: the spacing asked for, in input units
+};
+
 /// One 63-bit key a point; the order is by z, then y, then x.
 inline uint64_t latticeKey(const Vec3i& p) {
     return uint64_t(uint32_t(p.x)) | uint64_t(uint32_t(p.y)) << kLatticeBits |

@@ -1,0 +1,45 @@
+#pragma once
+// The repository of cells' meshes during construction (Cignoni et al. 2004, section 5): what leaves
+// and simplified cells leave behind for the next coarser level, packed, in temporary space.
+// Thread-safe.
+
+#include <cstdint>
+#include <vector>
+
+#include "extmem/spill.h"
+#include "geometry/mesh.h"
+#include "simplify/deviation.h"
+
+namespace pietra {
+
+/// One cell's triangles and, for each, the proven bounds.
+struct CellMesh {
+    Mesh mesh;
+    FaceBounds bounds;
+};
+
+class CellStore;
+
+/// Where a cell's packed mesh lies.
+struct CellBlob {
+    const CellStore* store = nullptr;
+    uint64_t position = 0;
+    uint32_t bytes = 0;
+    uint32_t triangles = 0;
+};
+
+class CellStore {
+public:
+    CellStore(TempSpace& space, int scalar_count) : spill_(space), scalar_count_(scalar_count) {}
+
+    CellBlob put(const CellMesh& cell);
+    /// Overwrites `cell`, keeping its capacity. `blob` is one of this store.
+    void get(const CellBlob& blob, CellMesh& cell) const;
+    void clear() { spill_.clear(); }
+
+private:
+    Spill spill_;
+    int scalar_count_;
+};
+
+}  // namespace pietra

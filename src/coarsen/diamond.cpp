@@ -1,0 +1,128 @@
+#include "coarsen/diamond.h"
+
+#include <algorithm>
+
+#include "base/check.h"
+#include "geometry/lattice.h"
+
+namespace pietra {
+
+namespace {
+
+constexpr uint32_t kNoVertex = ~0u;
+// Diamonds of the top levels are few: there, halving to the end costs nothing and makes small roots.
+constexpr int kTopLevels = 6;
+constexpr uint32_t kSmallestPatch = 250;
+
+void copyVertex(const Mesh& from, uint32_t v, int scalar_count, Mesh& to) {
+    to.position.push_back(from.position[v]);
+    to.normal.push_back(from.normal[v]);
+    if (!from.colour.empty()) to.colour.push_back(from.colour[v]);
+    for (int s = 0; s < scalar_count; ++s)
+        to.scalar.push_back(from.scalar[size_t(v) * size_t(scalar_count) + size_t(s)]);
+}
+
+}  // namespace
+
+uint32_t cellQuota(uint64_t children_triangles, uint32_t patch_triangles, int level) {
+    const uint64_t half = (children_triangles + 1) / 2;
+    const uint64_t wanted = level < kTopLevels ? std::min(kSmallestPatch, patch_triangles / 2)
+                                               : patch_triangles / 2;
+    return uint32_t(std::max(half, std::min(children_triangles * 63 / 100, wanted)));
+}
+
+void DiamondWorker::addCell(const CellMesh& child, uint8_t label) {
+    const Mesh& mesh = child.mesh;
+    Mesh& merged = merged_.mesh;
+    local_.resize(mesh.vertexCount());
+    for (uint32_t v = 0; v < mesh.vertexCount(); ++v) {
+        const auto [id, is_new] =
+            ids_.insert(latticeKey(mesh.position[v]), uint32_t(merged.vertexCount()));
+        if (is_new) copyVertex(mesh, v, scalar_count_, merged);
+        local_[v] = id;
+    }
+    for (const Triangle& t : mesh.triangle)
+        merged.triangle.push_back({local_[t[0]], local_[t[1]], local_[t[2]]});
+    const auto append = [](auto& to, const auto& from) {
+        to.insert(to.end(), from.begin(), from.end());
+    };
+    append(merged.edge_class, mesh.edge_class);
+    append(merged_.bounds.to_original, child.bounds.to_original);
+    append(merged_.bounds.from_original, child.bounds.from_original);
+    label_.resize(merged.triangleCount(), label);
+}
+
+void DiamondWorker::merge(const DiamondInput& input) {
+    merged_.mesh.clear();
+    merged_.bounds.to_original.clear();
+    merged_.bounds.from_original.clear();
+    label_.clear();
+    size_t triangles = 0;
+    for (const std::vector<CellBlob>& blobs : input.children)
+        for (const CellBlob& blob : blobs) triangles += blob.triangles;
+    ids_.reserve(triangles * 3 / 4);
+    for (size_t c = 0; c < input.children.size(); ++c)
+        for (const CellBlob& blob : input.children[c]) {
+            blob.store->get(blob, child_);
+            addCell(child_, uint8_t(c));
+        }
+}
+
+void DiamondWorker::run(const DiamondInput& input, DiamondOutput& output) {
+    merge(input);
+    output.input_triangles = merged_.mesh.triangleCount();
+    CHECK_LT(size_t(0), merged_.mesh.triangleCount());
+    SimplifyInput simplify;
+    simplify.mesh = &merged_.mesh;
+    simplify.cell = label_;
+    simplify.quota = input.quota;
+    simplify.shift = shift_;
+    simplify.scalar_count = scalar_count_;
+    simplify.droppable_error = input.child_error;
+    simplifier_.run(simplify, simplified_);
+
+    DeviationInput deviation;
+    deviation.before = &merged_.mesh;
+    deviation.before_bounds = &merged_.bounds;
+    deviation.after = &simplified_.mesh;
+    deviation.vertex_map = simplified_.vertex_map;
+    deviation.triangle_map = simplified_.triangle_map;
+    deviation.triangle_changed = simplified_.triangle_changed;
+    deviation.child_error = input.child_error;
+    output.error = deviation_.run(deviation, bounds_);
+
+    takeApart(input.children.size(), output);
+    output.output_triangles = simplified_.mesh.triangleCount();
+    output.locked_vertices = simplified_.locked_vertices;
+    output.clustered = simplified_.clustered;
+}
+
+void DiamondWorker::takeApart(size_t cells, DiamondOutput& output) {
+    const Mesh& mesh = simplified_.mesh;
+    output.cells.resize(cells);
+    for (size_t c = 0; c < cells; ++c) {
+        CellMesh& cell = output.cells[c];
+        cell.mesh.clear();
+        cell.bounds.to_original.clear();
+        cell.bounds.from_original.clear();
+        local_.assign(mesh.vertexCount(), kNoVertex);
+        for (size_t t = 0; t < mesh.triangleCount(); ++t) {
+            if (simplified_.cell[t] != c) continue;
+            Triangle triangle;
+            for (size_t k = 0; k < 3; ++k) {
+                uint32_t& v = local_[mesh.triangle[t][k]];
+                if (v == kNoVertex) {
+                    v = uint32_t(cell.mesh.vertexCount());
+                    copyVertex(mesh, mesh.triangle[t][k], scalar_count_, cell.mesh);
+                }
+                triangle[k] = v;
+            }
+            cell.mesh.triangle.push_back(triangle);
+            cell.mesh.edge_class.push_back(mesh.edge_class[t]);
+            cell.bounds.to_original.push_back(bounds_.to_original[t]);
+            cell.bounds.from_original.push_back(bounds_.from_original[t]);
+        }
+    }
+}
+
+}  // namespace pietra

@@ -1,0 +1,58 @@
+#pragma once
+// One diamond of the hierarchy made coarser (Cignoni et al. 2004, section 5.2): the meshes of its
+// cells' children are merged into one, simplified with the outer border locked, each cell to its own
+// quota, bounded, and taken apart into cells again. Deterministic; one worker a thread.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "coarsen/cell_path.h"
+#include "coarsen/cell_store.h"
+#include "coarsen/key_map.h"
+#include "simplify/deviation.h"
+#include "simplify/simplify.h"
+
+namespace pietra {
+
+struct DiamondInput {
+    /// For each split cell of the diamond, in path order: where its children's meshes lie (one or
+    /// two).
+    std::vector<std::vector<CellBlob>> children;
+    std::vector<uint32_t> quota;  ///< one a cell: triangles to reach
+    float child_error = 0;        ///< largest error stated by a child's diamond, lattice units
+};
+
+struct DiamondOutput {
+    std::vector<CellMesh> cells;  ///< one a split cell, maybe without triangles
+    float error = 0;              ///< proven bound of all cells, before saturation, lattice units
+    uint64_t input_triangles = 0, output_triangles = 0, locked_vertices = 0, clustered = 0;
+};
+
+class DiamondWorker {
+public:
+    DiamondWorker(int shift, int scalar_count) : shift_(shift), scalar_count_(scalar_count) {}
+    /// Overwrites `output`, keeping its capacity.
+    void run(const DiamondInput& input, DiamondOutput& output);
+
+private:
+    void merge(const DiamondInput& input);
+    void addCell(const CellMesh& child, uint8_t label);
+    void takeApart(size_t cells, DiamondOutput& output);
+
+    int shift_, scalar_count_;
+    Simplifier simplifier_;
+    Deviation deviation_;
+    KeyMap ids_;
+    CellMesh child_, merged_;
+    std::vector<uint8_t> label_;  // per merged triangle: its cell
+    SimplifyOutput simplified_;
+    FaceBounds bounds_;
+    std::vector<uint32_t> local_;  // per simplified vertex: its number in the cell at hand
+};
+
+/// Triangles that a cell with `children_triangles` below it is to keep: half of them, but not much
+/// below `patch_triangles` / 2 but at the coarsest levels.
+uint32_t cellQuota(uint64_t children_triangles, uint32_t patch_triangles, int level);
+
+}  // namespace pietra

@@ -1,0 +1,59 @@
+#pragma once
+// Temporary data of a build: an append-only store that lies in memory as far as the budget allows and
+// in an unlinked file beyond. Positions are stable; any thread may append and read at any time.
+// What was appended is read back by position and size; there is no order between appends of
+// different threads.
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/budget.h"
+#include "extmem/file.h"
+
+namespace pietra {
+
+/// Where temporary data goes, and how much memory it may take.
+struct TempSpace {
+    std::string directory;
+    Budget* budget = nullptr;      ///< memory taken from here, as long as...
+    size_t keep_free_bytes = 0;    ///< ...this much of it stays free for the work itself
+    std::atomic<uint64_t> bytes{0};       ///< temporary bytes held now, in memory and in files
+    std::atomic<uint64_t> peak_bytes{0};  ///< largest value of `bytes`
+    void add(uint64_t more);
+    void remove(uint64_t less) { bytes.fetch_sub(less); }
+};
+
+class Spill {
+public:
+    explicit Spill(TempSpace& space) : space_(&space) {}
+    ~Spill() { clear(); }
+    Spill(const Spill&) = delete;
+    Spill& operator=(const Spill&) = delete;
+
+    /// Returns the position of the data. Throws IoError (disk full).
+    uint64_t append(std::span<const std::byte> data);
+    void read(uint64_t position, std::span<std::byte> data) const;
+    uint64_t bytes() const { return end_; }
+    /// Frees memory and file.
+    void clear();
+
+private:
+    static constexpr size_t kBlock = size_t(4) << 20;
+    bool growMemory(uint64_t end);
+    TempSpace* space_;
+    mutable std::mutex mutex_;
+    std::vector<std::unique_ptr<std::byte[]>> blocks_;  // the first blocks_.size() * kBlock positions
+    std::vector<Reservation> reservations_;
+    File file_;              // positions from file_base_ on
+    uint64_t file_base_ = 0;
+    bool in_file_ = false;
+    uint64_t end_ = 0;
+};
+
+}  // namespace pietra

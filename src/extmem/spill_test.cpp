@@ -1,0 +1,62 @@
+#include "extmem/spill.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "base/error.h"
+#include "base/parallel.h"
+
+namespace pietra {
+namespace {
+
+std::vector<std::byte> pattern(size_t seed, size_t size) {
+    std::vector<std::byte> data(size);
+    for (size_t i = 0; i < size; ++i) data[i] = std::byte(seed * 31 + i * 7);
+    return data;
+}
+
+TEST(Spill, givesBackWhatWasAppendedFromMemoryAndFile) {
+    Budget budget(20 << 20);
+    TempSpace space{testing::TempDir(), &budget, 8 << 20};
+    Spill spill(space);
+    std::vector<uint64_t> position(400);
+    parallelFor(position.size(),
+                [&](size_t i) { position[i] = spill.append(pattern(i, 100000 + i)); });
+    EXPECT_LE(budget.peak(), 12u << 20);
+    EXPECT_GT(budget.peak(), 0u);
+    EXPECT_EQ(space.bytes, spill.bytes());
+    parallelFor(position.size(), [&](size_t i) {
+        std::vector<std::byte> data(100000 + i);
+        spill.read(position[i], data);
+        EXPECT_EQ(data, pattern(i, data.size())) << i;
+    });
+    spill.clear();
+    EXPECT_EQ(budget.used(), 0u);
+    EXPECT_EQ(space.bytes, 0u);
+}
+
+TEST(File, refusesDirectoriesAndMissingFiles) {
+    EXPECT_THROW(File(testing::TempDir(), File::Mode::kRead), IoError);
+    EXPECT_THROW(File(testing::TempDir() + "/none", File::Mode::kRead), IoError);
+}
+
+TEST(AtomicFile, leavesNothingBehindUnlessCommitted) {
+    const std::string path = testing::TempDir() + "/atomic";
+    std::remove(path.c_str());
+    { AtomicFile(path, false).file().write("x", 1); }
+    EXPECT_THROW(File(path, File::Mode::kRead), IoError);
+    {
+        AtomicFile file(path, false);
+        file.file().write("x", 1);
+        file.commit();
+    }
+    EXPECT_EQ(File(path, File::Mode::kRead).size(), 1u);
+    EXPECT_THROW(AtomicFile(path, false), UsageError);
+    EXPECT_NO_THROW(AtomicFile(path, true));
+    EXPECT_EQ(File(path, File::Mode::kRead).size(), 1u);
+    std::remove(path.c_str());
+}
+
+}  // namespace
+}  // namespace pietra

@@ -1,0 +1,35 @@
+#include "io/byte_reader.h"
+
+#include <fmt/format.h>
+
+#include <cstring>
+
+namespace pietra {
+
+ByteReader::ByteReader(std::unique_ptr<ByteSource> source)
+    : source_(std::move(source)), buffer_(kWindow + kPadding) {}
+
+void ByteReader::seek(uint64_t offset) {
+    if (offset >= base_ && offset - base_ <= end_) {
+        cursor_ = size_t(offset - base_);
+    } else {
+        base_ = offset;
+        cursor_ = end_ = 0;
+    }
+}
+
+void ByteReader::fill() {
+    std::memmove(buffer_.data(), data(), end_ - cursor_);
+    base_ += cursor_;
+    end_ -= cursor_;
+    cursor_ = 0;
+    end_ += source_->read(base_ + end_, buffer_.data() + end_, kWindow - end_);
+    std::memset(buffer_.data() + end_, 0, kPadding);
+}
+
+std::string ByteReader::placeOf(uint64_t offset) const {
+    return source_->isCompressed() ? fmt::format("byte {} of the unpacked data", offset)
+                                   : fmt::format("byte {}", offset);
+}
+
+}  // namespace pietra

@@ -1,0 +1,40 @@
+#pragma once
+// The bytes of an input file, whether it is stored plain or gzipped. Readers of formats sit on top
+// and never know which.
+//
+// Reads are by offset into the plain bytes. A gzipped file can only be decompressed forwards: a
+// read before the position reached starts again from the beginning. Memory: a few hundred KiB.
+// Files are read, never mapped, since mapped pages count in the resident set. Not thread-safe.
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace pietra {
+
+class ByteSource {
+public:
+    virtual ~ByteSource() = default;
+    /// What messages call the file.
+    virtual const std::string& path() const = 0;
+    /// Reads up to `bytes` plain bytes at `offset`; less only at the end. Throws IoError, or
+    /// InputError where compressed data is damaged or cut off.
+    virtual size_t read(uint64_t offset, void* data, size_t bytes) = 0;
+    /// The number of plain bytes: exact where isCompressed() is false, else an upper bound that
+    /// follows from the size of the file.
+    virtual uint64_t lengthBound() const = 0;
+    /// Bytes on disk.
+    virtual uint64_t storedBytes() const = 0;
+    virtual bool isCompressed() const = 0;
+};
+
+/// Opens a regular file; gzip is recognised by its magic bytes. Throws IoError (cannot open),
+/// InputError (a pipe or device: a mesh is read several times).
+std::unique_ptr<ByteSource> openBytes(const std::string& path);
+
+/// Bytes that are already there, for tests and fuzzing; `name` stands for the path.
+std::unique_ptr<ByteSource> bytesInMemory(const std::string& name, std::vector<uint8_t> bytes);
+
+}  // namespace pietra

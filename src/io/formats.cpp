@@ -1,0 +1,19 @@
+#include "io/formats.h"
+
+#include "io/ply_source.h"
+
+namespace pietra {
+
+namespace {
+
+constexpr MeshFormat kFormats[] = {
+    {"PLY", isPly, openPly},
+};
+
+}  // namespace
+
+std::span<const MeshFormat> meshFormats() {
+    return kFormats;
+}
+
+}  // namespace pietra

@@ -1,0 +1,113 @@
+#pragma once
+// Helpers of the tests in src/io: scratch directories, whole meshes, the shared data.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include "base/error.h"
+#include "io/triangle_source.h"
+
+namespace pietra {
+
+/// A directory that goes with the object.
+class ScratchDirectory {
+public:
+    ScratchDirectory() {
+        std::string name = (std::filesystem::temp_directory_path() / "pietra-test-XXXXXX").string();
+        if (!::mkdtemp(name.data())) throw std::runtime_error("mkdtemp");
+        path_ = name;
+    }
+    ~ScratchDirectory() { std::filesystem::remove_all(path_); }
+    std::string file(const std::string& name) const { return (path_ / name).string(); }
+    std::string path() const { return path_.string(); }
+    /// Writes `bytes` to a file and returns its path.
+    std::string write(const std::string& name, const std::string& bytes) const {
+        std::ofstream(file(name), std::ios::binary) << bytes;
+        return file(name);
+    }
+
+private:
+    std::filesystem::path path_;
+};
+
+inline std::string readWholeFile(const std::string& path) {
+    std::ostringstream text;
+    text << std::ifstream(path, std::ios::binary).rdbuf();
+    return text.str();
+}
+
+/// All that a source gives, in one piece.
+struct WholeMesh {
+    AttributeSchema schema;
+    VertexBatch vertices;
+    std::vector<std::array<uint64_t, 3>> triangles;
+    std::vector<std::string> notes;
+};
+
+inline WholeMesh readWhole(TriangleSource& source) {
+    WholeMesh mesh;
+    mesh.schema = source.schema();
+    VertexBatch vertices;
+    const auto append = [](auto& to, const auto& from) {
+        to.insert(to.end(), from.begin(), from.end());
+    };
+    source.rewindVertices();
+    while (source.readVertices(vertices)) {
+        EXPECT_EQ(vertices.first, mesh.vertices.position.size());
+        append(mesh.vertices.position, vertices.position);
+        append(mesh.vertices.normal, vertices.normal);
+        append(mesh.vertices.colour, vertices.colour);
+        append(mesh.vertices.scalar, vertices.scalar);
+    }
+    EXPECT_EQ(mesh.vertices.position.size(), source.vertexCount());
+    TriangleBatch triangles;
+    source.rewindTriangles();
+    while (source.readTriangles(triangles)) {
+        EXPECT_EQ(triangles.first, mesh.triangles.size());
+        append(mesh.triangles, triangles.triangle);
+    }
+    mesh.notes = source.notes();
+    return mesh;
+}
+
+inline WholeMesh readWhole(const std::string& path) {
+    return readWhole(*openSource({path}));
+}
+
+inline void expectSameMesh(const WholeMesh& a, const WholeMesh& b) {
+    EXPECT_EQ(a.schema, b.schema);
+    EXPECT_EQ(a.vertices.position, b.vertices.position);
+    EXPECT_EQ(a.vertices.normal, b.vertices.normal);
+    EXPECT_EQ(a.vertices.colour, b.vertices.colour);
+    EXPECT_EQ(a.vertices.scalar, b.vertices.scalar);
+    EXPECT_EQ(a.triangles, b.triangles);
+}
+
+/// What opening and reading a file fails with, or "" if it does not.
+inline std::string faultOf(const std::string& path) {
+    try {
+        readWhole(path);
+        return "";
+    } catch (const Error& e) {
+        return e.what();
+    }
+}
+
+/// A file of the data for development, which lies beside the checkout or where PIETRA_SHARED says;
+/// "" where it is absent.
+inline std::string sharedData(const std::string& name) {
+    namespace fs = std::filesystem;
+    const char* given = std::getenv("PIETRA_SHARED");
+    const fs::path root = fs::path(__FILE__).parent_path().parent_path().parent_path();
+    const fs::path shared = given ? fs::path(given) : root.parent_path() / "shared";
+    const fs::path path = shared / "data" / name;
+    return fs::exists(path) ? path.string() : "";
+}
+
+}  // namespace pietra

@@ -1,0 +1,27 @@
+#pragma once
+// What a renderer is given: meshes on one lattice, and how each is to be drawn. A refiner makes the
+// list; renderers know nothing of nodes, pages or methods.
+
+#include <cstdint>
+
+#include "geometry/mesh.h"
+
+namespace pietra {
+
+/// One mesh of a frame's draw list. Plain data; the mesh is not owned.
+struct DrawPatch {
+    /// Never null; must stay as it is until the renderer's draw() has returned. Every vertex has a
+    /// normal; triangles with two equal corners are allowed and draw nothing.
+    const Mesh* mesh = nullptr;
+    /// Triangles seen from behind are left out. Only for closed, consistently oriented components;
+    /// everything else is drawn, and lit, from both sides.
+    bool one_sided = false;
+    /// Names the patch for Show::kPatches: the same id has the same colour in every frame.
+    uint32_t id = 0;
+    /// Multiplies the surface's colour in Show::kShaded; white changes nothing.
+    Rgba8 tint{};
+    /// What Show::kLod and Show::kError show of this patch, see ShadeSettings.
+    float value = 0;
+};
+
+}  // namespace pietra

@@ -1,0 +1,74 @@
+#pragma once
+// What a pixel of a surface looks like: the settings all renderers share, the colours of the debug
+// views, and the step between linear light and the sRGB bytes of a picture. Only +, -, *, / and
+// sqrt, so that a picture's bytes are the same on every machine.
+
+#include <cstdint>
+
+#include "geometry/mesh.h"
+#include "geometry/vec.h"
+#include "render/draw_list.h"
+
+namespace pietra {
+
+/// The views of `render --show`.
+enum class Show {
+    kShaded,     ///< lit, in the vertex colours where there are any
+    kNormals,    ///< the normal in view space, x y z as red green blue
+    kDepth,      ///< near is light; the range is the picture's own
+    kLod,        ///< lit, each patch in the colour of its level, DrawPatch::value
+    kPatches,    ///< lit, each patch in a colour of its own
+    kTriangles,  ///< lit, each triangle in a colour of its own
+    kError,      ///< lit, DrawPatch::value from value_min (blue) to value_max (red)
+    kColour,     ///< vertex colours, unlit
+    kScalar,     ///< lit, one scalar attribute in a colour map
+};
+
+struct ShadeSettings {
+    Show show = Show::kShaded;
+    /// Towards the one light, in view space: right, up, towards the viewer. Any length but zero.
+    Vec3d light_direction{-0.45, 0.65, 0.6};
+    /// Draw and light every patch from both sides, whatever its `one_sided` says.
+    bool two_sided = false;
+
+    /// Scalars a vertex in the meshes drawn (AttributeSchema::scalars.size()), which of them
+    /// Show::kScalar shows, and the values at the two ends of the colour map.
+    int scalar_count = 0;
+    int scalar_index = 0;
+    float scalar_min = 0, scalar_max = 1;
+    /// DrawPatch::value at the two ends of the colour map of Show::kError.
+    float value_min = 0, value_max = 1;
+
+    /// Of surfaces without colours, and of the empty picture's first and last row, in sRGB.
+    Rgba8 surface{208, 200, 188, 255};
+    Rgba8 background_top{54, 60, 70, 255};
+    Rgba8 background_bottom{24, 26, 31, 255};
+};
+
+/// Linear light of an sRGB value in [0, 1], which is clamped, or of a byte; the byte nearest to a
+/// linear value, within a fifth of a step: srgbFromLinear(linearFromSrgb(byte)) == byte.
+float linearFromSrgb(float srgb);
+float linearFromSrgb(uint8_t srgb);
+Vec3f linearFromSrgb(const Rgba8& srgb);
+uint8_t srgbFromLinear(float linear);
+Rgba8 srgbFromLinear(const Vec3f& linear);
+
+/// The table behind srgbFromLinear: entry round(x * (kSrgbEntries - 1)) for x in [0, 1].
+inline constexpr int kSrgbEntries = 8192;
+const uint8_t* srgbTable();
+/// The 256 entries behind linearFromSrgb of bytes.
+const float* linearTable();
+
+/// Colours of the debug views, in linear light; t is clamped to [0, 1].
+Vec3f scalarColour(float t);          ///< dark violet, blue, green, yellow; even in lightness
+Vec3f heatColour(float t);            ///< blue, green, yellow, red
+Vec3f levelColour(float level);       ///< neighbouring levels differ well
+Vec3f hashColour(uint64_t identity);  ///< a light colour that looks random
+
+/// The colour in linear light that a patch as a whole has in a view; what a view takes from the
+/// vertices or from the triangle instead multiplies it (Show::kShaded) or replaces it.
+Vec3f patchColour(const ShadeSettings& settings, const DrawPatch& patch);
+/// Row `y` of a background `height` rows high, in linear light.
+Vec3f backgroundColour(const ShadeSettings& settings, int y, int height);
+
+}  // namespace pietra

@@ -1,0 +1,141 @@
+#include "simplify/deviation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/check.h"
+#include "simplify/deviation_partition.h"
+#include "simplify/deviation_surface.h"
+
+namespace pietra {
+
+namespace {
+
+using deviation::kNone;
+using deviation::Partition;
+using deviation::Piece;
+using deviation::Polygon;
+using deviation::Surface;
+
+/// The same three positions, in any order.
+bool sameTriangle(const Mesh& a, uint32_t ta, const Mesh& b, uint32_t tb) {
+    for (const uint32_t v : a.triangle[ta]) {
+        bool found = false;
+        for (const uint32_t w : b.triangle[tb]) found |= a.position[v] == b.position[w];
+        if (!found) return false;
+    }
+    for (const uint32_t w : b.triangle[tb]) {
+        bool found = false;
+        for (const uint32_t v : a.triangle[ta]) found |= a.position[v] == b.position[w];
+        if (!found) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+struct Deviation::State {
+    Surface before, after;
+    Partition partition;
+    std::vector<uint32_t> slot;     ///< per new face: an old face in the same slot, or kNone
+    std::vector<uint8_t> kept_old;  ///< per old face: it is a face of the new mesh, unchanged
+    std::vector<uint8_t> kept_new;  ///< per new face
+    std::vector<Piece> piece;
+
+    void findKept(const DeviationInput& in, FaceBounds& bounds);
+    uint32_t startForOld(const DeviationInput& in, uint32_t t) const;
+    uint32_t startForNew(uint32_t t) const;
+    static uint32_t nearestTo(const Surface& source, uint32_t t, const Surface& target);
+};
+
+Deviation::Deviation() : state_(std::make_unique<State>()) {}
+Deviation::~Deviation() = default;
+Deviation::Deviation(Deviation&&) noexcept = default;
+Deviation& Deviation::operator=(Deviation&&) noexcept = default;
+
+void Deviation::State::findKept(const DeviationInput& in, FaceBounds& bounds) {
+    const uint32_t new_count = after.faceCount();
+    slot.assign(new_count, kNone);
+    kept_old.assign(before.faceCount(), 0);
+    kept_new.assign(new_count, 0);
+    const size_t mapped = std::min<size_t>(in.triangle_map.size(), before.faceCount());
+    for (uint32_t t = 0; t < mapped; ++t) {
+        const uint32_t f = in.triangle_map[t];
+        if (f >= new_count) continue;
+        slot[f] = t;
+        const bool unchanged = f < in.triangle_changed.size() && in.triangle_changed[f] == 0;
+        if (!unchanged || !sameTriangle(*in.before, t, *in.after, f)) continue;
+        kept_old[t] = kept_new[f] = 1;
+        bounds.to_original[f] = std::max(bounds.to_original[f], in.before_bounds->to_original[t]);
+        bounds.from_original[f] = in.before_bounds->from_original[t];
+    }
+}
+
+uint32_t Deviation::State::nearestTo(const Surface& source, uint32_t t, const Surface& target) {
+    const Vec3i origin = source.corner(t, 0);
+    const Vec3f centre =
+        (Vec3f(source.corner(t, 1) - origin) + Vec3f(source.corner(t, 2) - origin)) / 3.0f;
+    return target.nearest(origin, centre, {}, {0, HUGE_VALF}).face;
+}
+
+uint32_t Deviation::State::startForOld(const DeviationInput& in, uint32_t t) const {
+    if (t < in.triangle_map.size() && in.triangle_map[t] < after.faceCount()) {
+        return in.triangle_map[t];
+    }
+    for (const uint32_t v : before.face(t).vertex) {
+        if (v >= in.vertex_map.size() || in.vertex_map[v] >= after.vertexCount()) continue;
+        const uint32_t f = after.faceAt(in.vertex_map[v]);
+        if (f != kNone) return f;
+    }
+    return nearestTo(before, t, after);
+}
+
+uint32_t Deviation::State::startForNew(uint32_t t) const {
+    return slot[t] != kNone ? slot[t] : nearestTo(after, t, before);
+}
+
+float Deviation::run(const DeviationInput& in, FaceBounds& bounds) {
+    State& s = *state_;
+    CHECK(in.before && in.after && in.before_bounds);
+    CHECK(!in.before->triangle.empty() && !in.after->triangle.empty());
+    const FaceBounds& old = *in.before_bounds;
+    CHECK_EQ(old.to_original.size(), in.before->triangle.size());
+    CHECK_EQ(old.from_original.size(), in.before->triangle.size());
+    bounds.to_original.assign(in.after->triangle.size(), 0.0f);
+    bounds.from_original.assign(in.after->triangle.size(), 0.0f);
+    s.before.assign(*in.before);
+    s.after.assign(*in.after);
+    s.findKept(in, bounds);
+    const float limit = 0.5f * in.child_error;
+
+    s.partition.setTarget(s.after, {});
+    for (uint32_t t = 0; t < s.before.faceCount(); ++t) {
+        if (s.kept_old[t]) continue;
+        s.piece.clear();
+        const Vec3i origin = s.before.corner(t, 0);
+        s.partition.cover(Polygon::of(s.before.local(t, origin)), origin, t, old.to_original[t],
+                          s.startForOld(in, t), limit, s.piece);
+        for (const Piece& piece : s.piece) {
+            float& a = bounds.to_original[piece.target];
+            a = std::max(a, piece.value);
+        }
+    }
+    s.partition.setTarget(s.before, old.from_original);
+    for (uint32_t t = 0; t < s.after.faceCount(); ++t) {
+        if (s.kept_new[t]) continue;
+        s.piece.clear();
+        const Vec3i origin = s.after.corner(t, 0);
+        s.partition.cover(Polygon::of(s.after.local(t, origin)), origin, t, 0.0f, s.startForNew(t),
+                          limit, s.piece);
+        for (const Piece& piece : s.piece) {
+            float& b = bounds.from_original[t];
+            b = std::max(b, piece.value);
+        }
+    }
+    float error = 0;
+    for (const float a : bounds.to_original) error = std::max(error, a);
+    for (const float b : bounds.from_original) error = std::max(error, b);
+    return error;
+}
+
+}  // namespace pietra

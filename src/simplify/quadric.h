@@ -1,0 +1,93 @@
+#pragma once
+// The quadric of a vertex: f(z) = z'Az + 2 b'z + c, the weighted sum of squared distances of the
+// point `vertex + z` to planes. Centred at its vertex, so b and c vanish at first and float
+// suffices.
+
+#include <cmath>
+
+#include "geometry/vec.h"
+
+namespace pietra {
+
+/// Weight of |z|^2 relative to that of the planes: makes every A definite and prefers short edges
+/// where the surface is flat. Ten times as much costs 8 to 38 % of rms error.
+inline constexpr float kRegulariser = 1e-4f;
+
+struct alignas(16) Quadric {
+    float a00 = 0, a11 = 0, a22 = 0, a01 = 0;
+    float a02 = 0, a12 = 0, c = 0, area = 0;
+    float b0 = 0, b1 = 0, b2 = 0, unused = 0;
+
+    /// Adds a plane through the vertex: `normal` of unit length.
+    void addPlane(const Vec3f& n, float weight) {
+        const Vec3f w = n * weight;
+        a00 += w.x * n.x;
+        a11 += w.y * n.y;
+        a22 += w.z * n.z;
+        a01 += w.x * n.y;
+        a02 += w.x * n.z;
+        a12 += w.y * n.z;
+    }
+
+    void addRegulariser(float weight) {
+        a00 += weight * kRegulariser;
+        a11 += weight * kRegulariser;
+        a22 += weight * kRegulariser;
+    }
+
+    Vec3f timesA(const Vec3f& z) const {
+        return {a00 * z.x + a01 * z.y + a02 * z.z, a01 * z.x + a11 * z.y + a12 * z.z,
+                a02 * z.x + a12 * z.y + a22 * z.z};
+    }
+
+    float valueAt(const Vec3f& z) const {
+        const Vec3f b{b0, b1, b2};
+        const Vec3f az = timesA(z);
+        return ((az.x + 2 * b.x) * z.x + (az.y + 2 * b.y) * z.y) + ((az.z + 2 * b.z) * z.z + c);
+    }
+
+    /// The same function, centred at a vertex that lies `d` further on.
+    Quadric movedBy(const Vec3f& d) const {
+        Quadric q = *this;
+        const Vec3f ad = timesA(d);
+        q.b0 = b0 + ad.x;
+        q.b1 = b1 + ad.y;
+        q.b2 = b2 + ad.z;
+        q.c = valueAt(d);
+        return q;
+    }
+
+    void add(const Quadric& q) {
+        a00 += q.a00;
+        a11 += q.a11;
+        a22 += q.a22;
+        a01 += q.a01;
+        a02 += q.a02;
+        a12 += q.a12;
+        c += q.c;
+        area += q.area;
+        b0 += q.b0;
+        b1 += q.b1;
+        b2 += q.b2;
+    }
+
+    /// Where it is least, by LDL'. Not finite where A is singular.
+    Vec3f minimum() const {
+        const float l10 = a01 / a00;
+        const float l20 = a02 / a00;
+        const float d1 = a11 - l10 * a01;
+        const float t21 = a12 - l20 * a01;
+        const float l21 = t21 / d1;
+        const float d2 = a22 - l20 * a02 - l21 * t21;
+        const float y0 = -b0;
+        const float y1 = -b1 - l10 * y0;
+        const float y2 = -b2 - l20 * y0 - l21 * y1;
+        const float z2 = y2 / d2;
+        const float z1 = y1 / d1 - l21 * z2;
+        const float z0 = y0 / a00 - l10 * z1 - l20 * z2;
+        return {z0, z1, z2};
+    }
+};
+static_assert(sizeof(Quadric) == 48);
+
+}  // namespace pietra

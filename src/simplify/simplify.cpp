@@ -1,0 +1,297 @@
+#include "simplify/simplify.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/check.h"
+#include "geometry/bounds.h"
+#include "geometry/lattice.h"
+#include "simplify/collapse.h"
+#include "simplify/collapse_queue.h"
+#include "simplify/edge_locks.h"
+#include "simplify/position_set.h"
+#include "simplify/working_mesh.h"
+
+namespace pietra {
+namespace {
+
+/// Border planes count as if the surface went on at a right angle for this many edge lengths.
+constexpr float kCurveWeight = 2;
+
+Vec3i centreOf(const Mesh& mesh) {
+    Box3i box;
+    for (const Vec3i& p : mesh.position) box.add(p);
+    const Vec3i middle = box.min + (box.max - box.min) / 2;
+    return snapToShift(middle, kMaxLatticeShift);
+}
+
+void buildFans(WorkingMesh& mesh) {
+    mesh.fan.assign(mesh.point.size(), Fan{0, 0, 0, 0});
+    mesh.epoch = 0;
+    for (const Face& face : mesh.face)
+        for (const uint32_t v : face.v) ++mesh.fan[v].count;
+    uint32_t begin = 0;
+    for (Fan& fan : mesh.fan) {
+        fan.begin = begin;
+        begin += fan.count;
+        fan.count = 0;
+    }
+    mesh.corner_end = begin;
+    mesh.corner.resize(std::max(mesh.corner.size(), size_t(begin)));
+    for (uint32_t f = 0; f < mesh.face.size(); ++f)
+        for (uint32_t k = 0; k < 3; ++k) {
+            Fan& fan = mesh.fan[mesh.face[f].v[k]];
+            mesh.corner[fan.begin + fan.count++] = 4 * f + k;
+        }
+}
+
+/// A plane through each edge on a curve, at a right angle to its triangle.
+void addCurvePlanes(WorkingMesh& mesh, const Face& face, const Vec3f& normal) {
+    for (uint32_t k = 0; k < 3; ++k) {
+        if (face.edgeClass(k) == EdgeClass::kManifold) continue;
+        const uint32_t a = face.v[k], b = face.v[kNextCorner[k]];
+        const Vec3f edge = mesh.point[b].vec() - mesh.point[a].vec();
+        const Vec3f across = glm::cross(edge, normal);
+        const float length_sq = glm::dot(across, across);
+        if (!(length_sq > 0)) continue;
+        const Vec3f unit = across / std::sqrt(length_sq);
+        mesh.quadric[a].addPlane(unit, kCurveWeight * length_sq);
+        mesh.quadric[b].addPlane(unit, kCurveWeight * length_sq);
+    }
+}
+
+void buildQuadrics(WorkingMesh& mesh) {
+    mesh.quadric.assign(mesh.point.size(), Quadric{});
+    for (const Face& face : mesh.face) {
+        const Vec3f a = mesh.point[face.v[0]].vec();
+        const Vec3f cross =
+            glm::cross(mesh.point[face.v[1]].vec() - a, mesh.point[face.v[2]].vec() - a);
+        const float area = std::sqrt(glm::dot(cross, cross));
+        if (!(area > 0)) continue;
+        const Vec3f normal = cross / area;
+        for (const uint32_t v : face.v) {
+            mesh.quadric[v].addPlane(normal, area);
+            mesh.quadric[v].addRegulariser(area);
+            mesh.quadric[v].area += area;
+        }
+        if (face.classes() != 0) addCurvePlanes(mesh, face, normal);
+    }
+}
+
+OctNormal mixNormals(const OctNormal& a, const OctNormal& b, float t) {
+    const Vec3f n = decodeNormal(a) * (1 - t) + decodeNormal(b) * t;
+    return glm::dot(n, n) > 1e-12f ? encodeNormal(n) : t < 0.5f ? a : b;
+}
+
+uint8_t mixBytes(uint8_t a, uint8_t b, float t) {
+    return uint8_t(float(a) + (float(b) - float(a)) * t + 0.5f);
+}
+
+}  // namespace
+
+struct Simplifier::State {
+    WorkingMesh mesh;
+    PositionSet positions;
+    CollapseQueue queue;
+    Collapser collapser{mesh, positions};
+    SnapGrid grid;
+    std::vector<OctNormal> normal;
+    std::vector<Rgba8> colour;
+    std::vector<float> scalar;
+    int scalar_count = 0;
+    std::vector<uint32_t> new_vertex;
+
+    void load(const SimplifyInput& input);
+    void buildPositions();
+    void pushEdge(uint32_t u, uint32_t v);
+    void pushAllEdges();
+    void pushEdgesOf(uint32_t v);
+    uint32_t drainQueue(float& worst);
+    void mixAttributes(uint32_t removed, uint32_t kept, const Vec3f& from, const Vec3f& to,
+                       const Vec3f& at);
+    void store(const SimplifyInput& input, SimplifyOutput& output);
+};
+
+void Simplifier::State::load(const SimplifyInput& input) {
+    const Mesh& in = *input.mesh;
+    CHECK_EQ(input.cell.size(), in.triangleCount());
+    CHECK_LE(input.quota.size(), size_t(256));
+    CHECK_EQ(in.edge_class.size(), in.triangleCount());
+    CHECK_EQ(in.normal.size(), in.vertexCount());
+    CHECK_EQ(in.scalar.size(), in.vertexCount() * size_t(input.scalar_count));
+    mesh.centre = centreOf(in);
+    mesh.point.resize(in.vertexCount());
+    for (size_t v = 0; v < in.vertexCount(); ++v) {
+        const Vec3i p = in.position[v] - mesh.centre;
+        mesh.point[v] = {float(p.x), float(p.y), float(p.z), 0};
+    }
+    mesh.face.resize(in.triangleCount());
+    mesh.cell_count.fill(0);
+    mesh.cell_quota.fill(0);
+    std::copy(input.quota.begin(), input.quota.end(), mesh.cell_quota.begin());
+    for (size_t t = 0; t < in.triangleCount(); ++t) {
+        const Triangle& c = in.triangle[t];
+        mesh.face[t] = {{c[0], c[1], c[2]}, uint32_t(input.cell[t]) | in.edge_class[t] << 8};
+        ++mesh.cell_count[input.cell[t]];
+    }
+    mesh.cells_above = 0;
+    for (uint32_t c = 0; c < 256; ++c) mesh.cells_above += mesh.cellAbove(c);
+    mesh.parent.resize(in.vertexCount());
+    for (uint32_t v = 0; v < mesh.parent.size(); ++v) mesh.parent[v] = v;
+    normal = in.normal;
+    colour = in.colour;
+    scalar = in.scalar;
+    scalar_count = input.scalar_count;
+    grid.step = float(1 << input.shift);
+    grid.inverse_step = 1 / grid.step;
+    grid.low = Vec3f(-mesh.centre);
+    grid.high = Vec3f(Vec3i(kLatticeMax) - mesh.centre);
+    queue.clear();
+}
+
+void Simplifier::State::buildPositions() {
+    positions.reset(2 * mesh.point.size());
+    for (uint32_t v = 0; v < mesh.point.size(); ++v)
+        if (!mesh.point[v].dead()) positions.insert(mesh, v);
+}
+
+void Simplifier::State::pushEdge(uint32_t u, uint32_t v) {
+    const float cost = placeEdge(mesh, u, v, grid).cost;
+    queue.push(cost, u, v, mesh.fan[u].stamp + mesh.fan[v].stamp);
+}
+
+/// Each edge once where triangles are plain; irregular ones maybe twice, which does no harm.
+void Simplifier::State::pushAllEdges() {
+    for (const Face& face : mesh.face) {
+        if (face.dead()) continue;
+        for (uint32_t k = 0; k < 3; ++k) {
+            const uint32_t u = face.v[k], v = face.v[kNextCorner[k]];
+            const uint32_t shared_flags = mesh.point[u].flags & mesh.point[v].flags;
+            if (u > v && !(shared_flags & kIrregularFlag)) continue;
+            if (collapsibleEdge(mesh, face, k)) pushEdge(u, v);
+        }
+    }
+}
+
+void Simplifier::State::pushEdgesOf(uint32_t v) {
+    const Fan& fan = mesh.fan[v];
+    const uint32_t epoch = ++mesh.epoch;
+    for (uint32_t i = 0; i < fan.count; ++i) {
+        const uint32_t corner = mesh.corner[fan.begin + i];
+        const Face& face = mesh.face[corner >> 2];
+        const uint32_t k = corner & 3, previous = kPreviousCorner[k];
+        for (const auto& [w, edge] :
+             {std::pair(face.v[kNextCorner[k]], k), std::pair(face.v[previous], previous)}) {
+            if (mesh.fan[w].mark == epoch) continue;
+            mesh.fan[w].mark = epoch;
+            if (collapsibleEdge(mesh, face, edge)) pushEdge(v, w);
+        }
+    }
+}
+
+void Simplifier::State::mixAttributes(uint32_t removed, uint32_t kept, const Vec3f& from,
+                                      const Vec3f& to, const Vec3f& at) {
+    const Vec3f edge = to - from;
+    const float t = std::clamp(glm::dot(at - from, edge) / glm::dot(edge, edge), 0.0f, 1.0f);
+    normal[kept] = mixNormals(normal[removed], normal[kept], t);
+    if (!colour.empty()) {
+        const Rgba8 a = colour[removed], b = colour[kept];
+        colour[kept] = {mixBytes(a.r, b.r, t), mixBytes(a.g, b.g, t), mixBytes(a.b, b.b, t),
+                        mixBytes(a.a, b.a, t)};
+    }
+    for (int i = 0; i < scalar_count; ++i) {
+        const float a = scalar[size_t(removed) * scalar_count + i];
+        float& b = scalar[size_t(kept) * scalar_count + i];
+        b = std::isfinite(a) && std::isfinite(b) ? a + (b - a) * t : t < 0.5f ? a : b;
+    }
+}
+
+uint32_t Simplifier::State::drainQueue(float& worst) {
+    uint32_t collapses = 0;
+    CollapseQueue::Entry e;
+    while (mesh.cells_above > 0 && queue.pop(e)) {
+        if (mesh.point[e.u].dead() || mesh.point[e.v].dead() ||
+            mesh.fan[e.u].stamp + mesh.fan[e.v].stamp != e.stamp)
+            continue;
+        const Vec3f at_u = mesh.point[e.u].vec(), at_v = mesh.point[e.v].vec();
+        const uint32_t kept = collapser.tryCollapse(e.u, e.v, grid);
+        if (kept == Collapser::kNoVertex) continue;
+        ++collapses;
+        if (!positions.insert(mesh, kept)) buildPositions();
+        const uint32_t removed = collapser.removed();
+        const bool u_removed = removed == e.u;
+        const Quadric& q = mesh.quadric[kept];
+        if (q.area > 0) worst = std::max(worst, collapser.placement().cost / q.area);
+        mixAttributes(removed, kept, u_removed ? at_u : at_v, u_removed ? at_v : at_u,
+                      collapser.placement().position);
+        pushEdgesOf(kept);
+    }
+    return collapses;
+}
+
+void Simplifier::State::store(const SimplifyInput& input, SimplifyOutput& out) {
+    const Mesh& in = *input.mesh;
+    out.mesh.clear();
+    out.cell.clear();
+    out.triangle_changed.clear();
+    out.triangle_map.assign(in.triangleCount(), kNone);
+    out.vertex_map.assign(in.vertexCount(), kNone);
+    new_vertex.assign(in.vertexCount(), kNone);
+    for (const Face& face : mesh.face)
+        if (!face.dead())
+            for (const uint32_t v : face.v) new_vertex[v] = 0;
+    uint32_t next = 0;
+    for (uint32_t v = 0; v < in.vertexCount(); ++v) {
+        const uint32_t root = mesh.root(v);
+        if (new_vertex[root] == kNone) continue;
+        if (root != v) continue;
+        new_vertex[v] = next++;
+        out.mesh.position.push_back(mesh.latticePosition(v));
+        out.mesh.normal.push_back(normal[v]);
+        if (!colour.empty()) out.mesh.colour.push_back(colour[v]);
+        const auto first = scalar.begin() + ptrdiff_t(v) * scalar_count;
+        out.mesh.scalar.insert(out.mesh.scalar.end(), first, first + scalar_count);
+    }
+    for (uint32_t v = 0; v < in.vertexCount(); ++v) out.vertex_map[v] = new_vertex[mesh.root(v)];
+    for (uint32_t f = 0; f < mesh.face.size(); ++f) {
+        const Face& face = mesh.face[f];
+        if (face.dead()) continue;
+        out.triangle_map[f] = uint32_t(out.mesh.triangle.size());
+        Triangle t;
+        bool changed = false;
+        for (uint32_t k = 0; k < 3; ++k) {
+            t[k] = new_vertex[face.v[k]];
+            changed |= out.mesh.position[t[k]] != in.position[in.triangle[f][k]];
+        }
+        out.mesh.triangle.push_back(t);
+        out.mesh.edge_class.push_back(uint8_t(face.classes()));
+        out.cell.push_back(uint8_t(face.cell()));
+        out.triangle_changed.push_back(changed);
+    }
+}
+
+Simplifier::Simplifier() : state_(std::make_unique<State>()) {}
+Simplifier::~Simplifier() = default;
+Simplifier::Simplifier(Simplifier&&) noexcept = default;
+Simplifier& Simplifier::operator=(Simplifier&&) noexcept = default;
+
+void Simplifier::run(const SimplifyInput& input, SimplifyOutput& output) {
+    State& s = *state_;
+    s.load(input);
+    buildFans(s.mesh);
+    output.locked_vertices = classifyVertices(s.mesh);
+    buildQuadrics(s.mesh);
+    s.buildPositions();
+    output.collapses = output.clustered = output.dropped_triangles = 0;
+    float worst = 0;
+    while (s.mesh.cells_above > 0) {
+        s.pushAllEdges();
+        const uint32_t collapses = s.drainQueue(worst);
+        if (collapses == 0) break;
+        output.collapses += collapses;
+    }
+    output.estimated_error = std::sqrt(worst);
+    s.store(input, output);
+}
+
+}  // namespace pietra

@@ -1,0 +1,220 @@
+#include "store/page_codec.h"
+
+#include <gtest/gtest.h>
+
+#include "base/check.h"
+#include "store/test_meshes.h"
+
+namespace pietra {
+namespace {
+
+using namespace pietra::testing;
+
+std::vector<const Mesh*> pointers(const std::vector<Mesh>& meshes) {
+    std::vector<const Mesh*> out;
+    for (const Mesh& mesh : meshes) out.push_back(&mesh);
+    return out;
+}
+
+/// Encodes and decodes, expects the same content, and returns the page.
+std::vector<std::byte> expectRoundTrip(const std::vector<Mesh>& meshes,
+                                       const PageSettings& settings,
+                                       PageCodec codec = PageCodec::kBest) {
+    const std::vector<std::byte> page = encodePage(pointers(meshes), settings, codec);
+    std::vector<Mesh> decoded;
+    std::string fault;
+    EXPECT_TRUE(decodePage(page, settings, decoded, fault)) << fault;
+    EXPECT_EQ(decoded.size(), meshes.size());
+    for (size_t i = 0; i < std::min(decoded.size(), meshes.size()); ++i)
+        EXPECT_TRUE(content(decoded[i], settings.normal_bits) ==
+                    content(meshes[i], settings.normal_bits))
+            << "patch " << i;
+    EXPECT_EQ(page, encodePage(pointers(meshes), settings, codec));
+    // What was decoded is a mesh like any other: its normals are already rounded.
+    const std::vector<std::byte> again = encodePage(pointers(decoded), settings, codec);
+    std::vector<Mesh> twice;
+    EXPECT_TRUE(decodePage(again, settings, twice, fault)) << fault;
+    for (size_t i = 0; i < std::min(twice.size(), decoded.size()); ++i)
+        EXPECT_TRUE(content(twice[i], kMaxNormalBits) == content(decoded[i], kMaxNormalBits));
+    return page;
+}
+
+const PageSettings kSettings[] = {{0, false, 0, 10}, {3, false, 0, 8},  {10, true, 0, 4},
+                                  {0, true, 2, 16},  {1, false, 1, 12}, {5, true, 5, 9}};
+const PageCodec kCodecs[] = {PageCodec::kPlain, PageCodec::kBest};
+
+TEST(PageCodec, keepsSmoothMeshes) {
+    Random random(1);
+    for (const PageCodec codec : kCodecs)
+        for (const PageSettings& s : kSettings)
+            expectRoundTrip({makeSheet(20, 30, s, random), makeSphere(3, s, random),
+                             makeSheet(1, 1, s, random), makeSheet(7, 1, s, random)},
+                            s, codec);
+}
+
+TEST(PageCodec, keepsSoups) {
+    Random random(2);
+    for (const PageCodec codec : kCodecs)
+        for (const PageSettings& s : kSettings)
+            for (int i = 0; i < 30; ++i) {
+                std::vector<Mesh> meshes;
+                for (uint32_t k = below(random, 4); k > 0; --k)
+                    meshes.push_back(
+                        makeSoup(3 + below(random, 60), below(random, 100), s, random));
+                expectRoundTrip(meshes, s, codec);
+            }
+}
+
+TEST(PageCodec, keepsEmptyPatchesAndSingleTriangles) {
+    Random random(3);
+    for (const PageCodec codec : kCodecs)
+        for (const PageSettings& s : kSettings) {
+            expectRoundTrip({}, s, codec);
+            expectRoundTrip({Mesh{}}, s, codec);
+            expectRoundTrip({Mesh{}, makeSoup(3, 1, s, random), Mesh{}}, s, codec);
+            expectRoundTrip({makeSoup(5, 0, s, random)}, s, codec);
+        }
+}
+
+TEST(PageCodec, keepsTrianglesThatUseAVertexTwice) {
+    Random random(4);
+    const PageSettings s;
+    Mesh mesh = makeSheet(3, 3, s, random);
+    mesh.triangle.push_back({4, 4, 5});
+    mesh.triangle.push_back({6, 6, 6});
+    mesh.edge_class.resize(mesh.triangle.size(), 0);
+    for (const PageCodec codec : kCodecs) expectRoundTrip({mesh}, s, codec);
+}
+
+TEST(PageCodec, keepsMoreThan65536Vertices) {
+    Random random(5);
+    const PageSettings s{2, false, 0, 10};
+    Mesh mesh = makeSheet(300, 250, s, random);
+    ASSERT_GT(mesh.vertexCount(), 65536u);
+    for (const PageCodec codec : kCodecs)
+        expectRoundTrip({mesh, makeSphere(2, s, random)}, s, codec);
+}
+
+TEST(PageCodec, sharesNoStateBetweenPages) {
+    Random random(6);
+    const PageSettings s;
+    const std::vector<Mesh> small = {makeSphere(2, s, random)};
+    const std::vector<std::byte> before = encodePage(pointers(small), s);
+    encodePage(pointers({makeSoup(500, 3000, s, random)}), s);
+    EXPECT_EQ(before, encodePage(pointers(small), s));
+}
+
+TEST(PageCodec, roundsNormalsToTheNearestCode) {
+    for (const int bits : {4, 8, 10, 16}) {
+        const int top = (1 << (bits - 1)) - 1;
+        for (int x = -32767; x <= 32767; x += bits == 16 ? 1 : 7) {
+            const int code = quantiseNormal(x, bits);
+            EXPECT_LE(std::abs(code), top);
+            EXPECT_LE(2 * std::abs(restoreNormal(code, bits) - x), 32767 / top + 1);
+            EXPECT_EQ(quantiseNormal(restoreNormal(code, bits), bits), code);
+            EXPECT_EQ(quantiseNormal(-x, bits), -code);
+        }
+    }
+}
+
+TEST(PageCodec, countsCanBePeekedAt) {
+    Random random(7);
+    const PageSettings s;
+    const std::vector<Mesh> meshes = {makeSheet(3, 4, s, random), makeSoup(9, 2, s, random)};
+    PageCounts counts;
+    std::string fault;
+    ASSERT_TRUE(peekPage(encodePage(pointers(meshes), s), counts, fault));
+    EXPECT_EQ(counts.patches, 2u);
+    EXPECT_EQ(counts.vertices, 20u + 9u);
+    EXPECT_EQ(counts.triangles, 24u + 2u);
+}
+
+TEST(PageCodec, refusesMeshesThatAreNone) {
+    Random random(8);
+    const PageSettings s{3, false, 0, 10};
+    Mesh off = makeSheet(2, 2, s, random);
+    off.position[3].y += 1;
+    EXPECT_THROW(encodePage(pointers({off}), s), BugError);
+    Mesh wild = makeSheet(2, 2, s, random);
+    wild.triangle[1][2] = 9;
+    EXPECT_THROW(encodePage(pointers({wild}), s), BugError);
+    Mesh bare = makeSheet(2, 2, s, random);
+    bare.normal.pop_back();
+    EXPECT_THROW(encodePage(pointers({bare}), s), BugError);
+}
+
+/// Decodes damaged bytes; whatever comes out must be a sane mesh.
+void decodeDamaged(std::span<const std::byte> page, const PageSettings& s, size_t& rejected) {
+    std::vector<Mesh> patches;
+    std::string fault;
+    // A copy of exact size on the heap, so that the address sanitizer sees any overread.
+    const std::vector<std::byte> exact(page.begin(), page.end());
+    if (!decodePage(exact, s, patches, fault)) {
+        EXPECT_FALSE(fault.empty());
+        ++rejected;
+        return;
+    }
+    for (const Mesh& mesh : patches) {
+        EXPECT_EQ(mesh.normal.size(), mesh.vertexCount());
+        EXPECT_EQ(mesh.edge_class.size(), mesh.triangleCount());
+        EXPECT_EQ(mesh.colour.size(), s.colours ? mesh.vertexCount() : 0);
+        EXPECT_EQ(mesh.scalar.size(), mesh.vertexCount() * size_t(s.scalar_count));
+        for (const Triangle& t : mesh.triangle)
+            for (const uint32_t v : t) EXPECT_LT(v, mesh.vertexCount());
+        for (const Vec3i& p : mesh.position)
+            EXPECT_TRUE(p.x >= 0 && p.y >= 0 && p.z >= 0 && p.x <= kLatticeMax &&
+                        p.y <= kLatticeMax && p.z <= kLatticeMax);
+    }
+}
+
+TEST(PageCodec, survivesEveryTruncationAndFlippedBits) {
+    Random random(9);
+    for (const PageCodec codec : kCodecs)
+        for (const PageSettings& s : kSettings) {
+            const std::vector<Mesh> meshes = {makeSheet(8, 9, s, random), Mesh{},
+                                              makeSoup(30, 40, s, random),
+                                              makeSphere(2, s, random)};
+            const std::vector<std::byte> page = encodePage(pointers(meshes), s, codec);
+            size_t rejected = 0;
+            for (size_t length = 0; length < page.size(); ++length)
+                decodeDamaged(std::span(page).first(length), s, rejected);
+            EXPECT_EQ(rejected, page.size());
+            for (int i = 0; i < 2000; ++i) {
+                std::vector<std::byte> flipped = page;
+                // Half of them near the start, where the counts are.
+                const auto range =
+                    uint32_t(i % 2 ? page.size() : std::min<size_t>(page.size(), 80));
+                for (uint32_t k = 1 + below(random, 3); k > 0; --k)
+                    flipped[below(random, range)] ^= std::byte(1u << below(random, 8));
+                decodeDamaged(flipped, s, rejected);
+            }
+        }
+}
+
+TEST(PageCodec, namesTheFault) {
+    Random random(10);
+    const PageSettings s;
+    std::vector<std::byte> page = encodePage(pointers({makeSheet(3, 3, s, random)}), s);
+    std::vector<Mesh> patches;
+    std::string fault;
+    const auto faultOf = [&](std::span<const std::byte> bytes, const PageSettings& settings) {
+        EXPECT_FALSE(decodePage(bytes, settings, patches, fault));
+        return fault;
+    };
+    EXPECT_EQ(faultOf(std::span(page).first(3), s), "its header is cut short");
+    EXPECT_EQ(faultOf(std::span(page).first(page.size() - 1), s),
+              "its compressed part does not end with the page");
+    PageSettings coloured = s;
+    coloured.colours = true;
+    EXPECT_EQ(faultOf(page, coloured), "its attributes are not the model's");
+    PageSettings coarse = s;
+    coarse.shift = 2;
+    EXPECT_EQ(faultOf(page, coarse), "its lattice is finer than the model's");
+    page[0] = std::byte(77);
+    EXPECT_EQ(faultOf(page, s), "its codec 77 is unknown to this version");
+    page[1] = std::byte(128);
+    EXPECT_EQ(faultOf(page, s), "its header is not one this version knows");
+}
+
+}  // namespace
+}  // namespace pietra
