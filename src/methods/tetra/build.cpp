@@ -17,9 +17,9 @@ namespace pietra::tetra {
 
 namespace {
 
-/// How the memory limit is spent. What the libraries and the program itself take is set aside first;
-/// of the rest, `work` is for the stages' own arrays, and temporary data may stay in memory as long
-/// as that much remains free.
+/// How the memory limit is spent. What the libraries and the program itself take is set aside
+/// first; of the rest, `work` is for the stages' own arrays, and temporary data may stay in memory
+/// as long as that much remains free.
 struct MemoryPlan {
     size_t budget, work;
     PartitionSettings partition;

@@ -1,7 +1,7 @@
 #pragma once
-// The second phase of construction (Cignoni et al. 2004, section 5.2): from leaf cells to the roots,
-// level by level. Diamonds of a level are independent and run in parallel; results are written in the
-// order of the curve, so the file does not depend on who was first.
+// The second phase of construction (Cignoni et al. 2004, section 5.2): from leaf cells to the
+// roots, level by level. Diamonds of a level are independent and run in parallel; results are
+// written in the order of the curve, so the file does not depend on who was first.
 
 #include "coarsen/leaves.h"
 #include "multires/method.h"
