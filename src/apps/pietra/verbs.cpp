@@ -4,6 +4,9 @@ namespace pietra {
 
 VerbTable makeVerbs() {
     VerbTable verbs;
+    verbs.push_back(makeBuildVerb());
+    verbs.push_back(makeInfoVerb());
+    verbs.push_back(makeRenderVerb());
     return verbs;
 }
 

@@ -8,6 +8,10 @@
 
 namespace pietra {
 
+std::unique_ptr<Verb> makeBuildVerb();
+std::unique_ptr<Verb> makeInfoVerb();
+std::unique_ptr<Verb> makeRenderVerb();
+
 using VerbTable = std::vector<std::unique_ptr<Verb>>;
 
 /// All verbs, in the order in which the help page lists them.
