@@ -5,6 +5,8 @@ namespace pietra {
 VerbTable makeVerbs() {
     VerbTable verbs;
     verbs.push_back(makeBuildVerb());
+    verbs.push_back(makeInfoVerb());
+    verbs.push_back(makeRenderVerb());
     return verbs;
 }
 

@@ -8,9 +8,11 @@
 
 namespace pietra {
 
-using VerbTable = std::vector<std::unique_ptr<Verb>>;
-
 std::unique_ptr<Verb> makeBuildVerb();
+std::unique_ptr<Verb> makeInfoVerb();
+std::unique_ptr<Verb> makeRenderVerb();
+
+using VerbTable = std::vector<std::unique_ptr<Verb>>;
 
 /// All verbs, in the order in which the help page lists them.
 VerbTable makeVerbs();

@@ -72,13 +72,12 @@ public:
         page_settings_.scalar_count = int(settings.schema.scalars.size());
     }
 
-    uint32_t run() {
+    LevelCounts run() {
         // Levels store about 2.5 times the input together: only progress depends on this guess.
         progress_.beginStage("coarsen", leaves_.triangles * 5 / 2);
-        uint32_t levels = 0;
         for (int level = leaves_.tree->deepestLevel(); level >= 0; --level)
-            if (buildLevel(level)) levels = std::max(levels, uint32_t(level) + 1);
-        return levels;
+            if (buildLevel(level)) counts_.levels = std::max(counts_.levels, uint32_t(level) + 1);
+        return counts_;
     }
 
 private:
@@ -104,6 +103,7 @@ private:
     std::unique_ptr<CellStore> store_below_, store_;
     NodeIndex nodes_in_level_ = 0;
     uint32_t groups_ = 0;
+    LevelCounts counts_;
 };
 
 std::vector<Item> LevelBuilder::itemsOf(int level) const {
@@ -267,6 +267,7 @@ void LevelBuilder::write(UnitResult& result) {
         Node& node = result.nodes[i];
         const bool joins =
             !node.isLeaf() && i > 0 && !result.nodes[i - 1].isLeaf() && node.group != uint32_t(i);
+        counts_.triangles += node.triangles;
         node.group = joins ? groups_ - 1 : groups_++;
         result.states[i].second.position = nodes_in_level_++;
     }
@@ -276,7 +277,7 @@ void LevelBuilder::write(UnitResult& result) {
 
 }  // namespace
 
-uint32_t buildLevels(Leaves& leaves, const LevelSettings& settings, TempSpace& space,
+LevelCounts buildLevels(Leaves& leaves, const LevelSettings& settings, TempSpace& space,
                      ModelWriter& writer, Progress& progress) {
     return LevelBuilder(leaves, settings, space, writer, progress).run();
 }

@@ -17,8 +17,13 @@ struct LevelSettings {
     int jobs;
 };
 
-/// Consumes the leaves. Returns the number of levels.
-uint32_t buildLevels(Leaves& leaves, const LevelSettings& settings, TempSpace& space,
+struct LevelCounts {
+    uint32_t levels = 0;
+    uint64_t triangles = 0;  ///< stored, over all levels
+};
+
+/// Consumes the leaves.
+LevelCounts buildLevels(Leaves& leaves, const LevelSettings& settings, TempSpace& space,
                      ModelWriter& writer, Progress& progress);
 
 }  // namespace pietra::tetra
