@@ -9,6 +9,7 @@
 #include "simplify/collapse.h"
 #include "simplify/collapse_queue.h"
 #include "simplify/edge_locks.h"
+#include "simplify/fallback.h"
 #include "simplify/position_set.h"
 #include "simplify/working_mesh.h"
 
@@ -19,6 +20,7 @@ namespace {
 constexpr float kCurveWeight = 2;
 
 Vec3i centreOf(const Mesh& mesh) {
+    if (mesh.position.empty()) return {0, 0, 0};
     Box3i box;
     for (const Vec3i& p : mesh.position) box.add(p);
     const Vec3i middle = box.min + (box.max - box.min) / 2;
@@ -94,6 +96,7 @@ struct Simplifier::State {
     PositionSet positions;
     CollapseQueue queue;
     Collapser collapser{mesh, positions};
+    Fallback fallback;
     SnapGrid grid;
     std::vector<OctNormal> normal;
     std::vector<Rgba8> colour;
@@ -109,6 +112,7 @@ struct Simplifier::State {
     uint32_t drainQueue(float& worst);
     void mixAttributes(uint32_t removed, uint32_t kept, const Vec3f& from, const Vec3f& to,
                        const Vec3f& at);
+    void fallBack(float droppable_error, SimplifyOutput& output);
     void store(const SimplifyInput& input, SimplifyOutput& output);
 };
 
@@ -128,7 +132,8 @@ void Simplifier::State::load(const SimplifyInput& input) {
     mesh.face.resize(in.triangleCount());
     mesh.cell_count.fill(0);
     mesh.cell_quota.fill(0);
-    std::copy(input.quota.begin(), input.quota.end(), mesh.cell_quota.begin());
+    for (size_t c = 0; c < input.quota.size(); ++c)
+        mesh.cell_quota[c] = std::min(input.quota[c], uint32_t(in.triangleCount()));
     for (size_t t = 0; t < in.triangleCount(); ++t) {
         const Triangle& c = in.triangle[t];
         mesh.face[t] = {{c[0], c[1], c[2]}, uint32_t(input.cell[t]) | in.edge_class[t] << 8};
@@ -229,6 +234,17 @@ uint32_t Simplifier::State::drainQueue(float& worst) {
     return collapses;
 }
 
+void Simplifier::State::fallBack(float droppable_error, SimplifyOutput& output) {
+    fallback.allowForLocks(mesh);
+    if (mesh.cells_above == 0) return;
+    const float droppable = std::max(droppable_error, output.estimated_error);
+    output.dropped_triangles = fallback.dropComponents(mesh, droppable);
+    if (mesh.cells_above == 0) return;
+    float spacing = droppable;
+    output.clustered = fallback.clusterVertices(mesh, spacing);
+    output.estimated_error = std::max(output.estimated_error, spacing);
+}
+
 void Simplifier::State::store(const SimplifyInput& input, SimplifyOutput& out) {
     const Mesh& in = *input.mesh;
     out.mesh.clear();
@@ -291,6 +307,7 @@ void Simplifier::run(const SimplifyInput& input, SimplifyOutput& output) {
         output.collapses += collapses;
     }
     output.estimated_error = std::sqrt(worst);
+    if (s.mesh.cells_above > 0) s.fallBack(input.droppable_error, output);
     s.store(input, output);
 }
 

@@ -12,7 +12,7 @@
 //    two triangles have the same corners.
 //  - An edge of class kManifold, kBorder, kTriple that lies inside the diamond is used 2, 1, 3
 //  times.
-//  - At least one triangle remains.
+//  - At least one triangle remains, if there was one.
 // Without the fallback (see counters) the topology is that of the input.
 //
 // How: vertices are placed at the quadric's optimum, rounded to the lattice. Collapses are taken

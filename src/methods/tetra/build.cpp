@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "coarsen/leaves.h"
 #include "coarsen/partition.h"
