@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstring>
+#include <ctime>
 #include <deque>
 #include <vector>
 
@@ -58,12 +58,22 @@ Scene makeScene(size_t triangles) {
     return scene;
 }
 
+/// Wall clock, and processor time of all threads together, which a busy machine disturbs less.
+struct Cost {
+    double wall_ms, cpu_ms;
+};
+
+double now(clockid_t clock) {
+    timespec t{};
+    clock_gettime(clock, &t);
+    return double(t.tv_sec) * 1e3 + double(t.tv_nsec) * 1e-6;
+}
+
 template <class Body>
-double milliseconds(const Body& body) {
-    const auto began = std::chrono::steady_clock::now();
+Cost costOf(const Body& body) {
+    const double wall = now(CLOCK_MONOTONIC), cpu = now(CLOCK_PROCESS_CPUTIME_ID);
     body();
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - began)
-        .count();
+    return {now(CLOCK_MONOTONIC) - wall, now(CLOCK_PROCESS_CPUTIME_ID) - cpu};
 }
 
 double median(std::vector<double> values) {
@@ -71,17 +81,28 @@ double median(std::vector<double> values) {
     return values[values.size() / 2];
 }
 
-void report(const char* name, const std::vector<double>& ms, size_t triangles) {
-    const double middle = median(ms);
-    fmt::print("  {:10} median {:7.2f} ms, best {:7.2f} ms, {:6.1f} M triangles/s\n", name, middle,
-               *std::min_element(ms.begin(), ms.end()), double(triangles) / middle / 1e3);
+template <class T>
+double medianOf(const std::vector<T>& costs, double T::*member) {
+    std::vector<double> values;
+    for (const T& c : costs) values.push_back(c.*member);
+    return median(values);
+}
+
+void report(const char* name, const std::vector<Cost>& costs, size_t triangles) {
+    const double wall = medianOf(costs, &Cost::wall_ms), cpu = medianOf(costs, &Cost::cpu_ms);
+    const auto best =
+        std::min_element(costs.begin(), costs.end(),
+                         [](const Cost& a, const Cost& b) { return a.wall_ms < b.wall_ms; });
+    fmt::print(
+        "  {:8}  wall: median {:6.2f}, best {:6.2f} ms, {:5.1f} M triangles/s;  cpu: {:6.2f} ms\n",
+        name, wall, best->wall_ms, double(triangles) / wall / 1e3, cpu);
 }
 
 void measure(const Scene& scene, int samples, int rounds, [[maybe_unused]] bool alone) {
     const Lattice lattice;
     const View view(scene.camera, kSize, lattice);
     Rasteriser rasteriser(view, lattice, samples, {});
-    std::vector<double> ours, theirs;
+    std::vector<Cost> ours, theirs;
     std::vector<RasterStatistics> stages;
     const auto draw = [&] {
         rasteriser.restart(view, lattice, {});
@@ -100,24 +121,22 @@ void measure(const Scene& scene, int samples, int rounds, [[maybe_unused]] bool 
     }
 #endif
     for (int i = 0; i < rounds; ++i) {
-        ours.push_back(milliseconds(draw));
+        ours.push_back(costOf(draw));
         stages.push_back(rasteriser.statistics());
 #ifdef PIETRA_BENCH_LLVMPIPE
-        if (rival) theirs.push_back(milliseconds([&] { rival->draw(); }));
+        if (rival) theirs.push_back(costOf([&] { rival->draw(); }));
 #endif
     }
     report("pietra", ours, scene.triangles);
-    const auto stage = [&](double RasterStatistics::*member) {
-        std::vector<double> ms;
-        for (const RasterStatistics& s : stages) ms.push_back(s.*member);
-        return median(ms);
-    };
-    fmt::print("             transform {:.2f}, raster {:.2f}, shade {:.2f}, finish {:.2f} ms\n",
+    const auto stage = [&](double RasterStatistics::*member) { return medianOf(stages, member); };
+    fmt::print("            transform {:.2f}, raster {:.2f}, shade {:.2f}, finish {:.2f} ms\n",
                stage(&RasterStatistics::transform_ms), stage(&RasterStatistics::raster_ms),
                stage(&RasterStatistics::shade_ms), stage(&RasterStatistics::finish_ms));
     if (theirs.empty()) return;
     report("llvmpipe", theirs, scene.triangles);
-    fmt::print("  ratio of medians {:.2f}\n", median(theirs) / median(ours));
+    fmt::print("  ratio of medians: wall {:.2f}, cpu {:.2f}\n",
+               medianOf(theirs, &Cost::wall_ms) / medianOf(ours, &Cost::wall_ms),
+               medianOf(theirs, &Cost::cpu_ms) / medianOf(ours, &Cost::cpu_ms));
 }
 
 }  // namespace

@@ -10,7 +10,8 @@ namespace pietra {
 namespace {
 
 constexpr uint32_t kNoVertex = ~0u;
-// Diamonds of the top levels are few: there, halving to the end costs nothing and makes small roots.
+// Diamonds of the top levels are few: there, halving to the end costs nothing and makes small
+// roots.
 constexpr int kTopLevels = 6;
 constexpr uint32_t kSmallestPatch = 250;
 
@@ -26,8 +27,8 @@ void copyVertex(const Mesh& from, uint32_t v, int scalar_count, Mesh& to) {
 
 uint32_t cellQuota(uint64_t children_triangles, uint32_t patch_triangles, int level) {
     const uint64_t half = (children_triangles + 1) / 2;
-    const uint64_t wanted = level < kTopLevels ? std::min(kSmallestPatch, patch_triangles / 2)
-                                               : patch_triangles / 2;
+    const uint64_t wanted =
+        level < kTopLevels ? std::min(kSmallestPatch, patch_triangles / 2) : patch_triangles / 2;
     return uint32_t(std::max(half, std::min(children_triangles * 63 / 100, wanted)));
 }
 

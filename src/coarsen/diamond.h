@@ -1,7 +1,7 @@
 #pragma once
 // One diamond of the hierarchy made coarser (Cignoni et al. 2004, section 5.2): the meshes of its
-// cells' children are merged into one, simplified with the outer border locked, each cell to its own
-// quota, bounded, and taken apart into cells again. Deterministic; one worker a thread.
+// cells' children are merged into one, simplified with the outer border locked, each cell to its
+// own quota, bounded, and taken apart into cells again. Deterministic; one worker a thread.
 
 #include <cstdint>
 #include <span>

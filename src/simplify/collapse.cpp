@@ -1,30 +1,9 @@
 #include "simplify/collapse.h"
 
 #include <algorithm>
-#include <utility>
+#include <bit>
 
 namespace pietra {
-
-Placement placeEdge(const WorkingMesh& mesh, uint32_t u, uint32_t v, const SnapGrid& grid) {
-    const Point& pu = mesh.point[u];
-    const Point& pv = mesh.point[v];
-    const Vec3f edge = pv.vec() - pu.vec();
-    Quadric q = mesh.quadric[v].movedBy(-edge);
-    q.add(mesh.quadric[u]);
-    Vec3f z;
-    if (pu.rank() > pv.rank()) {
-        z = {0, 0, 0};
-    } else if (pv.rank() > pu.rank()) {
-        z = edge;
-    } else {
-        z = q.minimum();
-        const Vec3f middle = edge * 0.5f;
-        const Vec3f off = z - middle;
-        if (!(glm::dot(off, off) <= glm::dot(edge, edge))) z = middle;
-        z = grid.snap(pu.vec() + z) - pu.vec();
-    }
-    return {pu.vec() + z, std::max(q.valueAt(z), 0.0f)};
-}
 
 void Collapser::findWings(uint32_t u, uint32_t v) {
     wing_count_ = 0;
@@ -69,11 +48,11 @@ bool Collapser::mergeWingClasses(const Point& u, const Point& v) {
     return true;
 }
 
-/// Also drops dead corners from the fan.
-void Collapser::readRing(uint32_t v, uint32_t other, Ring& ring) {
+/// Appends to the ring. Also drops dead corners from the fan.
+void Collapser::readRing(uint32_t v, uint32_t other) {
     Fan& fan = mesh_.fan[v];
     uint32_t* corners = mesh_.corner.data() + fan.begin;
-    uint32_t alive = 0, size = 0;
+    uint32_t alive = 0, size = ring_.size;
     for (uint32_t i = 0; i < fan.count; ++i) {
         const uint32_t corner = corners[i];
         const Face& face = mesh_.face[corner >> 2];
@@ -81,13 +60,14 @@ void Collapser::readRing(uint32_t v, uint32_t other, Ring& ring) {
         corners[alive++] = corner;
         const uint32_t n = face.v[kNextCorner[corner & 3]];
         const uint32_t p = face.v[kPreviousCorner[corner & 3]];
-        ring.corner[size] = corner;
-        ring.next[size] = n;
-        ring.previous[size] = p;
+        ring_.corner[size] = corner;
+        ring_.apex[size] = v;
+        ring_.next[size] = n;
+        ring_.previous[size] = p;
         size += n != other && p != other;
     }
     fan.count = alive;
-    ring.size = size;
+    ring_.size = size;
 }
 
 /// The link condition: both ends share no neighbours but those across the edge's triangles, and no
@@ -105,14 +85,13 @@ bool Collapser::linksAllow() {
         mark = mark == is_wing ? is_wing : in_link;
         return mark == is_wing;
     };
-    const Ring &of_u = ring_[0], &of_v = ring_[1];
     bool wings_joined = false;
-    for (uint32_t i = 0; i < of_u.size; ++i) {
-        const bool next_is_wing = markLink(of_u.next[i]);
-        wings_joined |= markLink(of_u.previous[i]) && next_is_wing;
+    for (uint32_t i = 0; i < ring_.size_u; ++i) {
+        const bool next_is_wing = markLink(ring_.next[i]);
+        wings_joined |= markLink(ring_.previous[i]) && next_is_wing;
     }
-    for (uint32_t i = 0; i < of_v.size; ++i) {
-        const uint32_t n = mesh_.fan[of_v.next[i]].mark, p = mesh_.fan[of_v.previous[i]].mark;
+    for (uint32_t i = ring_.size_u; i < ring_.size; ++i) {
+        const uint32_t n = mesh_.fan[ring_.next[i]].mark, p = mesh_.fan[ring_.previous[i]].mark;
         if (n == in_link || p == in_link) return false;
         if (wings_joined && n == is_wing && p == is_wing) return false;
     }
@@ -122,15 +101,15 @@ bool Collapser::linksAllow() {
 /// True if the removed vertex, merged into an outer one, would make a new edge to an outer vertex:
 /// the diamond across the border could make the same, and it would have four triangles.
 bool Collapser::makesOuterEdge() const {
-    const Ring& ring = ring_[0];
     const auto isNew = [&](uint32_t w) {
         for (uint32_t i = 0; i < wing_count_; ++i)
             if (wing_[i].vertex == w) return false;
         return true;
     };
-    for (uint32_t i = 0; i < ring.size; ++i) {
-        if (mesh_.point[ring.next[i]].outer() && isNew(ring.next[i])) return true;
-        if (mesh_.point[ring.previous[i]].outer() && isNew(ring.previous[i])) return true;
+    for (uint32_t i = 0; i < ring_.size_u; ++i) {
+        const uint32_t n = ring_.next[i], p = ring_.previous[i];
+        if (mesh_.point[n].outer() && isNew(n)) return true;
+        if (mesh_.point[p].outer() && isNew(p)) return true;
     }
     return false;
 }
@@ -143,66 +122,73 @@ float shapeOf(float normal_sq, float a_sq, float b_sq, float c_sq) {
     return normal_sq / (longest * longest);
 }
 
-/// Exact: twice the area is not zero.
+/// Exact: the triangle of these two sides is not degenerate.
 bool hasArea(const Vec3f& a, const Vec3f& b) {
     const int64_t ax = int64_t(a.x), ay = int64_t(a.y), az = int64_t(a.z);
     const int64_t bx = int64_t(b.x), by = int64_t(b.y), bz = int64_t(b.z);
     return ay * bz != az * by || az * bx != ax * bz || ax * by != ay * bx;
 }
 
-constexpr float kMinCosineSq = 0.2f * 0.2f;
-/// Height about 1/60 of the longest edge. Worse triangles may not get worse still.
-constexpr float kMinShape = 3e-4f;
-
 }  // namespace
 
-/// No triangle of the ring may turn by more than acos(0.2), become a sliver or lose its area when
-/// its apex goes from `from` to `to`.
-bool Collapser::keepsShape(const Ring& ring, const Vec3f& from, const Vec3f& to) const {
-    for (uint32_t i = 0; i < ring.size; ++i) {
-        const Vec3f n = mesh_.point[ring.next[i]].vec(), p = mesh_.point[ring.previous[i]].vec();
-        const Vec3f old_n = n - from, old_p = p - from, new_n = n - to, new_p = p - to;
-        const Vec3f old_normal = glm::cross(old_n, old_p), new_normal = glm::cross(new_n, new_p);
-        const float old_sq = glm::dot(old_normal, old_normal);
-        const float new_sq = glm::dot(new_normal, new_normal);
-        const float opposite = glm::dot(n - p, n - p);
-        const float new_shape =
-            shapeOf(new_sq, glm::dot(new_n, new_n), glm::dot(new_p, new_p), opposite);
-        if (!(new_shape > kMinShape)) {
-            const float old_shape =
-                shapeOf(old_sq, glm::dot(old_n, old_n), glm::dot(old_p, old_p), opposite);
-            if (!(new_shape >= old_shape) || !hasArea(new_n, new_p)) return false;
+/// None of the ring's first `count` triangles may turn by more than acos(0.2), become a sliver or
+/// lose its area when its apex goes to `to`.
+bool Collapser::keepsShapes(uint32_t count, const Vec3f& to) {
+    for (uint32_t pad = ring_.size; pad % kBatch != 0; ++pad)
+        ring_.apex[pad] = ring_.next[pad] = ring_.previous[pad] = 0;  // any valid vertex
+    for (uint32_t i = 0; i < count; i += kBatch) {
+        uint32_t suspects = kernels_.foldingTriangles(mesh_.point.data(), &ring_.apex[i],
+                                                      &ring_.next[i], &ring_.previous[i], to);
+        for (; suspects != 0; suspects &= suspects - 1) {
+            const uint32_t j = i + uint32_t(std::countr_zero(suspects));
+            if (j < count && !keepsShape(j, to)) return false;
         }
-        const float dot = glm::dot(old_normal, new_normal);
-        if (!(dot > 0 && dot * dot > kMinCosineSq * old_sq * new_sq) && old_sq > 0) return false;
     }
     return true;
 }
 
-uint32_t Collapser::tryCollapse(uint32_t u, uint32_t v, const SnapGrid& grid) {
-    if (mesh_.point[u].rank() > mesh_.point[v].rank()) std::swap(u, v);
-    if (mesh_.fan[u].count + mesh_.fan[v].count > kMaxRing) return kNoVertex;
-    findWings(u, v);
-    if (wing_count_ == 0 || !quotaAllows()) return kNoVertex;
-    const Point &pu = mesh_.point[u], &pv = mesh_.point[v];
-    if (!mergeWingClasses(pu, pv)) return kNoVertex;
-    readRing(u, v, ring_[0]);
-    readRing(v, u, ring_[1]);
-    if (ring_[0].size + ring_[1].size == 0) return kNoVertex;
-    if (!linksAllow()) return kNoVertex;
-    if (pv.outer() && makesOuterEdge()) return kNoVertex;
-    placement_ = placeEdge(mesh_, u, v, grid);
-    if (positions_.occupied(mesh_, placement_.position, u, v)) return kNoVertex;
-    if (!keepsShape(ring_[0], pu.vec(), placement_.position)) return kNoVertex;
-    if (pv.rank() <= pu.rank() && !keepsShape(ring_[1], pv.vec(), placement_.position))
-        return kNoVertex;
-    apply(u, v);
-    return v;
+/// As the kernel says, but slivers may become better ones, and degenerate triangles turn anyhow.
+bool Collapser::keepsShape(uint32_t i, const Vec3f& to) const {
+    const Vec3f from = mesh_.point[ring_.apex[i]].vec();
+    const Vec3f n = mesh_.point[ring_.next[i]].vec(), p = mesh_.point[ring_.previous[i]].vec();
+    const Vec3f old_n = n - from, old_p = p - from, new_n = n - to, new_p = p - to;
+    const Vec3f old_normal = glm::cross(old_n, old_p), new_normal = glm::cross(new_n, new_p);
+    const float old_sq = glm::dot(old_normal, old_normal);
+    const float new_sq = glm::dot(new_normal, new_normal);
+    const float opposite = glm::dot(n - p, n - p);
+    const float new_shape =
+        shapeOf(new_sq, glm::dot(new_n, new_n), glm::dot(new_p, new_p), opposite);
+    if (!(new_shape > kMinShape)) {
+        const float old_shape =
+            shapeOf(old_sq, glm::dot(old_n, old_n), glm::dot(old_p, old_p), opposite);
+        if (!(new_shape >= old_shape) || !hasArea(new_n, new_p)) return false;
+    }
+    if (!(old_sq > 0)) return true;
+    const float turn = glm::dot(old_normal, new_normal);
+    return turn > 0 && turn * (turn / old_sq) > kMinCosineSq * new_sq;
 }
 
-void Collapser::apply(uint32_t u, uint32_t v) {
+bool Collapser::tryCollapse(uint32_t u, uint32_t v, const Vec3f& to) {
+    if (mesh_.fan[u].count + mesh_.fan[v].count > kMaxRing) return false;
+    findWings(u, v);
+    if (wing_count_ == 0 || !quotaAllows()) return false;
+    const Point &pu = mesh_.point[u], &pv = mesh_.point[v];
+    if (!mergeWingClasses(pu, pv)) return false;
+    ring_.size = 0;
+    readRing(u, v);
+    ring_.size_u = ring_.size;
+    readRing(v, u);
+    if (ring_.size == 0 || !linksAllow()) return false;
+    if (pv.outer() && makesOuterEdge()) return false;
+    if (positions_.occupied(mesh_, to, u, v)) return false;
+    const bool v_moves = pv.rank() == pu.rank();
+    if (!keepsShapes(v_moves ? ring_.size : ring_.size_u, to)) return false;
+    apply(u, v, to);
+    return true;
+}
+
+void Collapser::apply(uint32_t u, uint32_t v, const Vec3f& to) {
     Point &pu = mesh_.point[u], &pv = mesh_.point[v];
-    const Vec3f to = placement_.position;
     Quadric q = mesh_.quadric[u].movedBy(to - pu.vec());
     q.add(mesh_.quadric[v].movedBy(to - pv.vec()));
     mesh_.quadric[v] = q;
@@ -210,38 +196,36 @@ void Collapser::apply(uint32_t u, uint32_t v) {
     pu.flags |= kDeadFlag;
     mesh_.parent[u] = v;
     ++mesh_.fan[v].stamp;
-    removed_ = u;
-    for (uint32_t i = 0; i < wing_count_; ++i) mesh_.killFace(wing_[i].face);
-    const Ring& ring = ring_[0];
-    for (uint32_t i = 0; i < ring.size; ++i)
-        mesh_.face[ring.corner[i] >> 2].v[ring.corner[i] & 3] = v;
+    for (uint32_t i = 0; i < ring_.size_u; ++i)
+        mesh_.face[ring_.corner[i] >> 2].v[ring_.corner[i] & 3] = v;
     for (uint32_t i = 0; i < wing_count_; ++i) {
-        if (wing_[i].merged == EdgeClass::kManifold) continue;
-        for (const Ring& r : ring_)
-            for (uint32_t j = 0; j < r.size; ++j) {
-                Face& face = mesh_.face[r.corner[j] >> 2];
-                const uint32_t k = r.corner[j] & 3;
-                if (r.next[j] == wing_[i].vertex) face.setEdgeClass(k, wing_[i].merged);
-                if (r.previous[j] == wing_[i].vertex)
-                    face.setEdgeClass(kPreviousCorner[k], wing_[i].merged);
-            }
+        mesh_.killFace(wing_[i].face);
+        if (wing_[i].merged != EdgeClass::kManifold)
+            setClassOfEdgesTo(wing_[i].vertex, wing_[i].merged);
     }
     writeFan(v);
 }
 
-/// In place where both rings fit into the old fan, else at the arena's end.
+void Collapser::setClassOfEdgesTo(uint32_t w, EdgeClass c) {
+    for (uint32_t i = 0; i < ring_.size; ++i) {
+        Face& face = mesh_.face[ring_.corner[i] >> 2];
+        const uint32_t k = ring_.corner[i] & 3;
+        if (ring_.next[i] == w) face.setEdgeClass(k, c);
+        if (ring_.previous[i] == w) face.setEdgeClass(kPreviousCorner[k], c);
+    }
+}
+
+/// In place where the ring fits into the old fan, else at the arena's end.
 void Collapser::writeFan(uint32_t v) {
     Fan& fan = mesh_.fan[v];
-    const uint32_t size = ring_[0].size + ring_[1].size;
-    if (size > fan.count) {
-        if (mesh_.corner_end + size > mesh_.corner.size())
-            mesh_.corner.resize(2 * mesh_.corner.size() + size);
+    if (ring_.size > fan.count) {
+        if (mesh_.corner_end + ring_.size > mesh_.corner.size())
+            mesh_.corner.resize(2 * mesh_.corner.size() + ring_.size);
         fan.begin = mesh_.corner_end;
-        mesh_.corner_end += size;
+        mesh_.corner_end += ring_.size;
     }
-    fan.count = size;
-    uint32_t* out = mesh_.corner.data() + fan.begin;
-    for (const Ring& r : ring_) out = std::copy_n(r.corner.data(), r.size, out);
+    fan.count = ring_.size;
+    std::copy_n(ring_.corner.data(), ring_.size, mesh_.corner.data() + fan.begin);
 }
 
 }  // namespace pietra

@@ -39,20 +39,23 @@ public:
         occupied_[bucket / 64] |= uint64_t(1) << (bucket % 64);
     }
 
-    /// The entry pushed last among those of the lowest bucket; false if there is none.
-    bool pop(Entry& entry) {
+    /// Takes up to `room` entries of the lowest bucket, those pushed last first. 0: empty.
+    uint32_t popBatch(Entry* entries, uint32_t room) {
         for (uint32_t word = 0; word < occupied_.size(); ++word) {
             if (occupied_[word] == 0) continue;
             const uint32_t bucket = word * 64 + uint32_t(std::countr_zero(occupied_[word]));
-            const uint32_t index = head_[bucket];
-            entry = entries_[index];
-            head_[bucket] = entry.next;
-            if (entry.next == kEnd) occupied_[word] &= occupied_[word] - 1;
-            entries_[index].next = free_;
-            free_ = index;
-            return true;
+            uint32_t index = head_[bucket], count = 0;
+            for (; index != kEnd && count < room; ++count) {
+                entries[count] = entries_[index];
+                entries_[index].next = free_;
+                free_ = index;
+                index = entries[count].next;
+            }
+            head_[bucket] = index;
+            if (index == kEnd) occupied_[word] &= occupied_[word] - 1;
+            return count;
         }
-        return false;
+        return 0;
     }
 
 private:

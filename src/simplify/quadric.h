@@ -70,23 +70,6 @@ struct alignas(16) Quadric {
         b1 += q.b1;
         b2 += q.b2;
     }
-
-    /// Where it is least, by LDL'. Not finite where A is singular.
-    Vec3f minimum() const {
-        const float l10 = a01 / a00;
-        const float l20 = a02 / a00;
-        const float d1 = a11 - l10 * a01;
-        const float t21 = a12 - l20 * a01;
-        const float l21 = t21 / d1;
-        const float d2 = a22 - l20 * a02 - l21 * t21;
-        const float y0 = -b0;
-        const float y1 = -b1 - l10 * y0;
-        const float y2 = -b2 - l20 * y0 - l21 * y1;
-        const float z2 = y2 / d2;
-        const float z1 = y1 / d1 - l21 * z2;
-        const float z0 = y0 / a00 - l10 * z1 - l20 * z2;
-        return {z0, z1, z2};
-    }
 };
 static_assert(sizeof(Quadric) == 48);
 

@@ -106,10 +106,21 @@ struct Simplifier::State {
 
     void load(const SimplifyInput& input);
     void buildPositions();
+    EdgeKernels kernels = chooseEdgeKernels();
+    EdgeBatch pending;  // edges to be evaluated and pushed
+    uint32_t pending_count = 0;
+
     void pushEdge(uint32_t u, uint32_t v);
+    void flushPending();
     void pushAllEdges();
-    void pushEdgesOf(uint32_t v);
-    uint32_t drainQueue(float& worst);
+    void pushEdgesAround(uint32_t v);
+    bool stillThere(uint32_t u, uint32_t v, uint32_t stamp) const {
+        return !mesh.point[u].dead() && !mesh.point[v].dead() &&
+               mesh.fan[u].stamp + mesh.fan[v].stamp == stamp;
+    }
+    uint32_t popCandidates(EdgeBatch& batch, uint32_t* stamps);
+    uint32_t drainQueue();
+    float worst_deviation_sq = 0;
     void mixAttributes(uint32_t removed, uint32_t kept, const Vec3f& from, const Vec3f& to,
                        const Vec3f& at);
     void fallBack(float droppable_error, SimplifyOutput& output);
@@ -152,6 +163,7 @@ void Simplifier::State::load(const SimplifyInput& input) {
     grid.low = Vec3f(-mesh.centre);
     grid.high = Vec3f(Vec3i(kLatticeMax) - mesh.centre);
     queue.clear();
+    worst_deviation_sq = 0;
 }
 
 void Simplifier::State::buildPositions() {
@@ -161,8 +173,23 @@ void Simplifier::State::buildPositions() {
 }
 
 void Simplifier::State::pushEdge(uint32_t u, uint32_t v) {
-    const float cost = placeEdge(mesh, u, v, grid).cost;
-    queue.push(cost, u, v, mesh.fan[u].stamp + mesh.fan[v].stamp);
+    pending.u[pending_count] = u;
+    pending.v[pending_count] = v;
+    if (++pending_count == kBatch) flushPending();
+}
+
+void Simplifier::State::flushPending() {
+    if (pending_count == 0) return;
+    for (uint32_t i = pending_count; i < kBatch; ++i) {
+        pending.u[i] = pending.u[0];
+        pending.v[i] = pending.v[0];
+    }
+    kernels.place(mesh.point.data(), mesh.quadric.data(), grid, pending);
+    for (uint32_t i = 0; i < pending_count; ++i) {
+        const uint32_t u = pending.u[i], v = pending.v[i];
+        queue.push(pending.cost[i], u, v, mesh.fan[u].stamp + mesh.fan[v].stamp);
+    }
+    pending_count = 0;
 }
 
 /// Each edge once where triangles are plain; irregular ones maybe twice, which does no harm.
@@ -176,21 +203,23 @@ void Simplifier::State::pushAllEdges() {
             if (collapsibleEdge(mesh, face, k)) pushEdge(u, v);
         }
     }
+    flushPending();
 }
 
-void Simplifier::State::pushEdgesOf(uint32_t v) {
-    const Fan& fan = mesh.fan[v];
+/// The edges of `v`, whose ring the collapser has just read.
+void Simplifier::State::pushEdgesAround(uint32_t v) {
+    const Ring& ring = collapser.ring();
     const uint32_t epoch = ++mesh.epoch;
-    for (uint32_t i = 0; i < fan.count; ++i) {
-        const uint32_t corner = mesh.corner[fan.begin + i];
-        const Face& face = mesh.face[corner >> 2];
-        const uint32_t k = corner & 3, previous = kPreviousCorner[k];
-        for (const auto& [w, edge] :
-             {std::pair(face.v[kNextCorner[k]], k), std::pair(face.v[previous], previous)}) {
-            if (mesh.fan[w].mark == epoch) continue;
-            mesh.fan[w].mark = epoch;
-            if (collapsibleEdge(mesh, face, edge)) pushEdge(v, w);
-        }
+    const auto visit = [&](uint32_t w, const Face& face, uint32_t edge) {
+        if (mesh.fan[w].mark == epoch) return;
+        mesh.fan[w].mark = epoch;
+        if (collapsibleEdge(mesh, face, edge)) pushEdge(v, w);
+    };
+    for (uint32_t i = 0; i < ring.size; ++i) {
+        const Face& face = mesh.face[ring.corner[i] >> 2];
+        const uint32_t k = ring.corner[i] & 3;
+        visit(ring.next[i], face, k);
+        visit(ring.previous[i], face, kPreviousCorner[k]);
     }
 }
 
@@ -211,25 +240,51 @@ void Simplifier::State::mixAttributes(uint32_t removed, uint32_t kept, const Vec
     }
 }
 
-uint32_t Simplifier::State::drainQueue(float& worst) {
+/// Up to eight edges from the lowest bucket, as they are now, with their places. 0: none left.
+uint32_t Simplifier::State::popCandidates(EdgeBatch& batch, uint32_t* stamps) {
+    uint32_t count = 0;
+    while (count == 0) {
+        std::array<CollapseQueue::Entry, kBatch> entries;
+        const uint32_t popped = queue.popBatch(entries.data(), kBatch);
+        if (popped == 0) return 0;
+        for (uint32_t i = 0; i < popped; ++i) {
+            const auto& e = entries[i];
+            if (!stillThere(e.u, e.v, e.stamp)) continue;
+            const bool swap = mesh.point[e.u].rank() > mesh.point[e.v].rank();
+            batch.u[count] = swap ? e.v : e.u;
+            batch.v[count] = swap ? e.u : e.v;
+            stamps[count++] = e.stamp;
+        }
+    }
+    for (uint32_t i = count; i < kBatch; ++i) {
+        batch.u[i] = batch.u[0];
+        batch.v[i] = batch.v[0];
+    }
+    kernels.place(mesh.point.data(), mesh.quadric.data(), grid, batch);
+    return count;
+}
+
+uint32_t Simplifier::State::drainQueue() {
     uint32_t collapses = 0;
-    CollapseQueue::Entry e;
-    while (mesh.cells_above > 0 && queue.pop(e)) {
-        if (mesh.point[e.u].dead() || mesh.point[e.v].dead() ||
-            mesh.fan[e.u].stamp + mesh.fan[e.v].stamp != e.stamp)
-            continue;
-        const Vec3f at_u = mesh.point[e.u].vec(), at_v = mesh.point[e.v].vec();
-        const uint32_t kept = collapser.tryCollapse(e.u, e.v, grid);
-        if (kept == Collapser::kNoVertex) continue;
-        ++collapses;
-        if (!positions.insert(mesh, kept)) buildPositions();
-        const uint32_t removed = collapser.removed();
-        const bool u_removed = removed == e.u;
-        const Quadric& q = mesh.quadric[kept];
-        if (q.area > 0) worst = std::max(worst, collapser.placement().cost / q.area);
-        mixAttributes(removed, kept, u_removed ? at_u : at_v, u_removed ? at_v : at_u,
-                      collapser.placement().position);
-        pushEdgesOf(kept);
+    EdgeBatch batch;
+    std::array<uint32_t, kBatch> stamps;
+    while (mesh.cells_above > 0) {
+        const uint32_t count = popCandidates(batch, stamps.data());
+        if (count == 0) break;
+        for (uint32_t i = 0; i < count && mesh.cells_above > 0; ++i) {
+            const uint32_t u = batch.u[i], v = batch.v[i];
+            if (!stillThere(u, v, stamps[i])) continue;
+            const Vec3f from = mesh.point[u].vec(), to = mesh.point[v].vec();
+            const Vec3f at{batch.x[i], batch.y[i], batch.z[i]};
+            if (!collapser.tryCollapse(u, v, at)) continue;
+            ++collapses;
+            if (!positions.insert(mesh, v)) buildPositions();
+            const float area = mesh.quadric[v].area;
+            if (area > 0) worst_deviation_sq = std::max(worst_deviation_sq, batch.cost[i] / area);
+            mixAttributes(u, v, from, to, at);
+            pushEdgesAround(v);
+        }
+        flushPending();
     }
     return collapses;
 }
@@ -299,14 +354,13 @@ void Simplifier::run(const SimplifyInput& input, SimplifyOutput& output) {
     buildQuadrics(s.mesh);
     s.buildPositions();
     output.collapses = output.clustered = output.dropped_triangles = 0;
-    float worst = 0;
     while (s.mesh.cells_above > 0) {
         s.pushAllEdges();
-        const uint32_t collapses = s.drainQueue(worst);
+        const uint32_t collapses = s.drainQueue();
         if (collapses == 0) break;
         output.collapses += collapses;
     }
-    output.estimated_error = std::sqrt(worst);
+    output.estimated_error = std::sqrt(s.worst_deviation_sq);
     if (s.mesh.cells_above > 0) s.fallBack(input.droppable_error, output);
     s.store(input, output);
 }

@@ -1,30 +1,44 @@
 #pragma once
-// The colour of one pixel of one triangle. Attributes are interpolated by perspective-correct
-// barycentric coordinates at the pixel's centre, or at the nearest point of the triangle where a
-// sample but not the centre is covered: they depend on triangle and pixel alone, not on what else
-// is visible there.
+// The colours of visible pixels. Attributes are interpolated by perspective-correct barycentric
+// coordinates at the pixel's centre, or near the closest point of the triangle where a sample but
+// not the centre is covered: they depend on triangle and pixel alone, not on what else is visible
+// there, nor on which pixels are shaded together.
+
+#include <span>
 
 #include "render/raster/batch.h"
+#include "render/raster/shade_kernel.h"
 #include "render/shading.h"
 
 namespace pietra {
 
+/// One triangle in one pixel.
+struct ShadeItem {
+    uint32_t number;  ///< of the triangle, in the batch
+    uint16_t x, y;
+    uint32_t target;  ///< the caller's
+};
+
 class PixelShader {
 public:
+    /// All three must outlive this.
     PixelShader(const View& view, const Projection& projection, const ShadeSettings& settings);
-    Rgba8 shade(const Batch& batch, uint32_t number, int32_t x, int32_t y) const;
+
+    /// `colour` takes one sRGB colour an item. At most kShadeLanes items.
+    void shade(const Batch& batch, std::span<const ShadeItem> items, Rgba8* colour) const;
 
 private:
-    struct Corners;
-    Vec3f barycentric(const Corners& corners, int32_t x, int32_t y, bool& back) const;
-    Vec3f light(const Vec3f& base, const Vec3f& normal, const Vec3f& to_eye) const;
-    Vec3f baseColour(const Batch& batch, const Corners& corners, const Vec3f& weight) const;
+    struct Source;
+    void gather(const Batch& batch, const ShadeItem& item, size_t lane, Source& source,
+                ShadeLanes& lanes) const;
+    void giveWeights(const Source& source, const ShadeItem& item, size_t lane,
+                     ShadeLanes& lanes) const;
+    Vec3f baseColour(const Source& source, size_t lane, const ShadeLanes& lanes) const;
 
     const Projection& projection_;
     const ShadeSettings& settings_;
-    Vec3f right_, up_, back_;
-    float centre_x_, centre_y_, inv_focal_;
-    Vec3f light_;
+    ShadeView view_;
+    bool base_is_patch_;  ///< no colour comes from vertices or triangles
 };
 
 }  // namespace pietra

@@ -10,6 +10,8 @@
 #include "render/raster/clip.h"
 #include "render/raster/coverage.h"
 #include "render/raster/pixel_shader.h"
+#include "render/raster/transform.h"
+#include "render/raster/triangle_kernel.h"
 
 namespace pietra {
 namespace {
@@ -93,74 +95,68 @@ void Rasteriser::State::layOut(std::span<const DrawPatch> patches) {
 void Rasteriser::State::transform(BatchPatch& entry) {
     const Mesh& mesh = *entry.patch->mesh;
     CHECK_EQ(mesh.normal.size(), mesh.position.size());
-    int32_t min_x = std::numeric_limits<int32_t>::max(),
-            max_x = std::numeric_limits<int32_t>::lowest();
-    int32_t min_y = min_x, max_y = max_x;
-    for (size_t i = 0; i < mesh.vertexCount(); ++i) {
-        ScreenVertex v = projection.project(projection.viewPosition(mesh.position[i]));
-        v.normal = mesh.normal[i];
-        batch.vertex[entry.first_vertex + i] = v;
-        if (v.x == kNoImage) {
-            entry.whole = false;
-        } else {
-            min_x = std::min(min_x, v.x);
-            max_x = std::max(max_x, v.x);
-            min_y = std::min(min_y, v.y);
-            max_y = std::max(max_y, v.y);
-        }
-    }
+    const ImageBounds bounds = transformVertices(projection, mesh.position, mesh.normal,
+                                                 batch.vertex.data() + entry.first_vertex);
+    entry.whole = bounds.whole;
     entry.box = screen();
     if (entry.whole)
-        entry.box =
-            entry.box.intersected({min_x >> kSubpixelBits, min_y >> kSubpixelBits,
-                                   (max_x >> kSubpixelBits) + 1, (max_y >> kSubpixelBits) + 1});
+        entry.box = entry.box.intersected(
+            {bounds.min_x >> kSubpixelBits, bounds.min_y >> kSubpixelBits,
+             (bounds.max_x >> kSubpixelBits) + 1, (bounds.max_y >> kSubpixelBits) + 1});
 }
 
 void Rasteriser::State::drawPatch(const BatchPatch& entry, const VisibilityTile& tile) {
     const Mesh& mesh = *entry.patch->mesh;
-    const ScreenVertex* vertex = batch.vertex.data() + entry.first_vertex;
-    uint32_t number = entry.first_number;
-    for (const Triangle& t : mesh.triangle) {
-        const ScreenVertex v[3] = {vertex[t[0]], vertex[t[1]], vertex[t[2]]};
-        if (v[0].x != kNoImage && v[1].x != kNoImage && v[2].x != kNoImage) {
-            drawTriangle(tile,
-                         {ScreenPoint{v[0].x, v[0].y, v[0].inv_depth},
-                          {v[1].x, v[1].y, v[1].inv_depth},
-                          {v[2].x, v[2].y, v[2].inv_depth}},
-                         entry.both_sides, number);
-        } else {
-            const ScreenPolygon p = clipTriangle(
-                projection, {mesh.position[t[0]], mesh.position[t[1]], mesh.position[t[2]]});
-            for (int k = 2; k < p.count; ++k)
-                drawTriangle(tile, {p.point[0], p.point[k - 1], p.point[k]}, entry.both_sides,
-                             number);
-        }
-        ++number;
+    thread_local std::vector<uint32_t> clipped;
+    clipped.clear();
+    drawTriangles(tile,
+                  {mesh.triangle.data(), mesh.triangle.size(), entry.first_number,
+                   batch.vertex.data() + entry.first_vertex, entry.both_sides},
+                  clipped);
+    for (const uint32_t i : clipped) {
+        const Triangle& t = mesh.triangle[i];
+        const ScreenPolygon p = clipTriangle(
+            projection, {mesh.position[t[0]], mesh.position[t[1]], mesh.position[t[2]]});
+        for (int k = 2; k < p.count; ++k)
+            drawTriangle(tile, {p.point[0], p.point[k - 1], p.point[k]}, entry.both_sides,
+                         entry.first_number + i);
     }
 }
 
 void Rasteriser::State::resolve(const PixelShader& shader, const PixelBox& box) {
+    ShadeItem item[kShadeLanes];
+    Rgba8 colour[kShadeLanes];
+    size_t items = 0;
+    Rgba8* target = samples == 1 ? picture.colour.data() : sample_colour.data();
+    const auto flush = [&] {
+        if (items == 0) return;
+        shader.shade(batch, {item, items}, colour);
+        for (size_t i = 0; i < items; ++i) {
+            const uint32_t first = item[i].target >> 4;
+            for (uint32_t mask = item[i].target & 15, s = 0; mask != 0; mask >>= 1, ++s)
+                if (mask & 1) target[size_t(first) * size_t(samples) + s] = colour[i];
+        }
+        items = 0;
+    };
     for (int y = box.y0; y < box.y1; ++y)
         for (int x = box.x0; x < box.x1; ++x) {
             const size_t pixel = picture.index(x, y);
-            if (samples == 1) {
-                if (key[pixel] == 0 || uint32_t(key[pixel]) == kResolved) continue;
-                picture.colour[pixel] = shader.shade(batch, triangleNumber(key[pixel]), x, y);
-                key[pixel] |= kResolved;
-                continue;
-            }
-            VisibilityKey* sample = &key[4 * pixel];
-            for (int s = 0; s < 4; ++s) {
+            VisibilityKey* sample = &key[pixel * size_t(samples)];
+            for (int s = 0; s < samples; ++s) {
                 if (sample[s] == 0 || uint32_t(sample[s]) == kResolved) continue;
                 const uint32_t low = uint32_t(sample[s]);
-                const Rgba8 colour = shader.shade(batch, triangleNumber(sample[s]), x, y);
-                for (int t = s; t < 4; ++t)
+                uint32_t mask = 0;
+                for (int t = s; t < samples; ++t)
                     if (uint32_t(sample[t]) == low && sample[t] != 0) {
-                        sample_colour[4 * pixel + size_t(t)] = colour;
+                        mask |= 1u << t;
                         sample[t] |= kResolved;
                     }
+                item[items++] = {0xfffffffe - low, uint16_t(x), uint16_t(y),
+                                 uint32_t(pixel << 4 | mask)};
+                if (items == size_t(kShadeLanes)) flush();
             }
         }
+    flush();
 }
 
 Rgba8 Rasteriser::State::averagedColour(size_t pixel, const Vec3f& background) const {

@@ -1,0 +1,44 @@
+#pragma once
+// The arithmetic of shading, for as many pixels at a time as a SIMD register has lanes. Gathering
+// what a pixel needs from patches, and what is rare, is PixelShader's; here are two steps over
+// arrays of at most kShadeLanes pixels, with the same bits for any number of lanes.
+
+#include <cstdint>
+
+#include "render/raster/projection.h"
+
+namespace pietra {
+
+/// Pixels shaded together, whatever the SIMD level.
+inline constexpr int kShadeLanes = 16;
+
+struct alignas(64) ShadeLanes {
+    // Set by the caller.
+    ScreenVertex corner[3][kShadeLanes];
+    int32_t x[kShadeLanes], y[kShadeLanes];  ///< pixel
+    int32_t both_sides[kShadeLanes];         ///< 0 or -1
+    /// Where `given` is -1 a corner has no image, and perspective-correct weights (of any sum but
+    /// 0) and facing are the caller's.
+    int32_t given[kShadeLanes], given_back[kShadeLanes];
+    float given_weight[3][kShadeLanes];
+    // Set by interpolateLanes().
+    float weight[3][kShadeLanes];  ///< barycentric, not negative, sum 1
+    float normal[3][kShadeLanes];  ///< in view space, unit length, towards the eye
+    float to_eye[3][kShadeLanes];  ///< in view space, unit length
+    // Set by the caller for lightLanes().
+    float base[3][kShadeLanes];  ///< surface colour in linear light
+    // Set by lightLanes().
+    float lit[3][kShadeLanes];  ///< in linear light
+};
+
+struct ShadeView {
+    Vec3f right, up, back;     ///< axes of the view, in lattice space
+    float centre_x, centre_y;  ///< of the picture, in pixels
+    float inv_focal;           ///< 1 / pixels
+    Vec3f light;               ///< towards the light, in view space, unit length
+};
+
+void interpolateLanes(const ShadeView& view, ShadeLanes& lanes);
+void lightLanes(const ShadeView& view, ShadeLanes& lanes);
+
+}  // namespace pietra
