@@ -141,9 +141,9 @@ bool hasArea(const Vec3f& a, const Vec3f& b) {
 /// None of the ring's first `count` triangles may turn by more than acos(0.2), become a sliver or
 /// lose its area when its apex goes to `to`.
 bool Collapser::keepsShapes(uint32_t count, const Vec3f& to) {
-    for (uint32_t pad = ring_.size; pad % kBatch != 0; ++pad)
+    for (uint32_t pad = ring_.size; pad % kFoldBatch != 0; ++pad)
         ring_.apex[pad] = ring_.next[pad] = ring_.previous[pad] = 0;  // any valid vertex
-    for (uint32_t i = 0; i < count; i += kBatch) {
+    for (uint32_t i = 0; i < count; i += kFoldBatch) {
         uint32_t suspects = kernels_.foldingTriangles(mesh_.point.data(), &ring_.apex[i],
                                                       &ring_.next[i], &ring_.previous[i], to);
         for (; suspects != 0; suspects &= suspects - 1) {

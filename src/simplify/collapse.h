@@ -25,7 +25,7 @@ inline bool collapsibleEdge(const WorkingMesh& mesh, const Face& face, uint32_t 
 struct Ring {
     uint32_t size = 0;    ///< of both
     uint32_t size_u = 0;  ///< those of u
-    std::array<uint32_t, kMaxRing + kBatch> corner, apex, next, previous;
+    std::array<uint32_t, kMaxRing + kFoldBatch> corner, apex, next, previous;
 };
 
 /// A triangle on the collapsing edge (u, v): it dies, and its edges to `vertex` become one.
