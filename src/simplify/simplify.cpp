@@ -28,7 +28,9 @@ Vec3i centreOf(const Mesh& mesh) {
 }
 
 void buildFans(WorkingMesh& mesh) {
-    mesh.fan.assign(mesh.point.size(), Fan{0, 0, 0, 0});
+    mesh.fan.assign(mesh.point.size(), Fan{0, 0});
+    mesh.stamp.assign(mesh.point.size(), 0);
+    mesh.mark.assign(mesh.point.size(), 0);
     mesh.epoch = 0;
     for (const Face& face : mesh.face)
         for (const uint32_t v : face.v) ++mesh.fan[v].count;
@@ -57,8 +59,10 @@ void addCurvePlanes(WorkingMesh& mesh, const Face& face, const Vec3f& normal) {
         const float length_sq = glm::dot(across, across);
         if (!(length_sq > 0)) continue;
         const Vec3f unit = across / std::sqrt(length_sq);
-        mesh.quadric[a].addPlane(unit, kCurveWeight * length_sq);
-        mesh.quadric[b].addPlane(unit, kCurveWeight * length_sq);
+        Quadric q = Quadric::ofPlane(unit, kCurveWeight * length_sq);
+        q.area = 0;
+        mesh.quadric[a].addMatrix(q);
+        mesh.quadric[b].addMatrix(q);
     }
 }
 
@@ -71,11 +75,8 @@ void buildQuadrics(WorkingMesh& mesh) {
         const float area = std::sqrt(glm::dot(cross, cross));
         if (!(area > 0)) continue;
         const Vec3f normal = cross / area;
-        for (const uint32_t v : face.v) {
-            mesh.quadric[v].addPlane(normal, area);
-            mesh.quadric[v].addRegulariser(area);
-            mesh.quadric[v].area += area;
-        }
+        const Quadric q = Quadric::ofPlane(normal, area);
+        for (const uint32_t v : face.v) mesh.quadric[v].addMatrix(q);
         if (face.classes() != 0) addCurvePlanes(mesh, face, normal);
     }
 }
@@ -115,8 +116,7 @@ struct Simplifier::State {
     void pushAllEdges();
     void pushEdgesAround(uint32_t v);
     bool stillThere(uint32_t u, uint32_t v, uint32_t stamp) const {
-        return !mesh.point[u].dead() && !mesh.point[v].dead() &&
-               mesh.fan[u].stamp + mesh.fan[v].stamp == stamp;
+        return mesh.stamp[u] + mesh.stamp[v] == stamp;
     }
     uint32_t popCandidates(EdgeBatch& batch, uint32_t* stamps);
     uint32_t drainQueue();
@@ -125,6 +125,8 @@ struct Simplifier::State {
                        const Vec3f& at);
     void fallBack(float droppable_error, SimplifyOutput& output);
     void store(const SimplifyInput& input, SimplifyOutput& output);
+    void storeVertices(const Mesh& in, SimplifyOutput& out);
+    void storeTriangles(const Mesh& in, SimplifyOutput& out);
 };
 
 void Simplifier::State::load(const SimplifyInput& input) {
@@ -187,7 +189,8 @@ void Simplifier::State::flushPending() {
     kernels.place(mesh.point.data(), mesh.quadric.data(), grid, pending);
     for (uint32_t i = 0; i < pending_count; ++i) {
         const uint32_t u = pending.u[i], v = pending.v[i];
-        queue.push(pending.cost[i], u, v, mesh.fan[u].stamp + mesh.fan[v].stamp);
+        const uint32_t stamp = mesh.stamp[u] + mesh.stamp[v];
+        if (stamp < WorkingMesh::kDeadStamp) queue.push(pending.cost[i], {u, v, stamp});
     }
     pending_count = 0;
 }
@@ -209,10 +212,10 @@ void Simplifier::State::pushAllEdges() {
 /// The edges of `v`, whose ring the collapser has just read.
 void Simplifier::State::pushEdgesAround(uint32_t v) {
     const Ring& ring = collapser.ring();
-    const uint32_t epoch = ++mesh.epoch;
+    const uint32_t epoch = mesh.epoch += 2;
     const auto visit = [&](uint32_t w, const Face& face, uint32_t edge) {
-        if (mesh.fan[w].mark == epoch) return;
-        mesh.fan[w].mark = epoch;
+        if (mesh.mark[w] == epoch) return;
+        mesh.mark[w] = epoch;
         if (collapsibleEdge(mesh, face, edge)) pushEdge(v, w);
     };
     for (uint32_t i = 0; i < ring.size; ++i) {
@@ -301,43 +304,59 @@ void Simplifier::State::fallBack(float droppable_error, SimplifyOutput& output) 
 }
 
 void Simplifier::State::store(const SimplifyInput& input, SimplifyOutput& out) {
-    const Mesh& in = *input.mesh;
-    out.mesh.clear();
-    out.cell.clear();
-    out.triangle_changed.clear();
-    out.triangle_map.assign(in.triangleCount(), kNone);
-    out.vertex_map.assign(in.vertexCount(), kNone);
-    new_vertex.assign(in.vertexCount(), kNone);
+    storeVertices(*input.mesh, out);
+    storeTriangles(*input.mesh, out);
+}
+
+void Simplifier::State::storeVertices(const Mesh& in, SimplifyOutput& out) {
+    const size_t count = in.vertexCount();
+    new_vertex.assign(count, kNone);
     for (const Face& face : mesh.face)
         if (!face.dead())
             for (const uint32_t v : face.v) new_vertex[v] = 0;
     uint32_t next = 0;
-    for (uint32_t v = 0; v < in.vertexCount(); ++v) {
-        const uint32_t root = mesh.root(v);
-        if (new_vertex[root] == kNone) continue;
-        if (root != v) continue;
-        new_vertex[v] = next++;
-        out.mesh.position.push_back(mesh.latticePosition(v));
-        out.mesh.normal.push_back(normal[v]);
-        if (!colour.empty()) out.mesh.colour.push_back(colour[v]);
-        const auto first = scalar.begin() + ptrdiff_t(v) * scalar_count;
-        out.mesh.scalar.insert(out.mesh.scalar.end(), first, first + scalar_count);
+    for (uint32_t& index : new_vertex)
+        if (index != kNone) index = next++;
+    out.mesh.position.resize(next);
+    out.mesh.normal.resize(next);
+    out.mesh.colour.resize(colour.empty() ? 0 : next);
+    out.mesh.scalar.resize(size_t(next) * scalar_count);
+    out.vertex_map.resize(count);
+    for (uint32_t v = 0; v < count; ++v) {
+        const uint32_t to = new_vertex[mesh.root(v)];
+        out.vertex_map[v] = to;
+        if (to == kNone || mesh.parent[v] != v) continue;
+        out.mesh.position[to] = mesh.latticePosition(v);
+        out.mesh.normal[to] = normal[v];
+        if (!colour.empty()) out.mesh.colour[to] = colour[v];
+        for (int i = 0; i < scalar_count; ++i)
+            out.mesh.scalar[size_t(to) * scalar_count + i] = scalar[size_t(v) * scalar_count + i];
     }
-    for (uint32_t v = 0; v < in.vertexCount(); ++v) out.vertex_map[v] = new_vertex[mesh.root(v)];
+}
+
+void Simplifier::State::storeTriangles(const Mesh& in, SimplifyOutput& out) {
+    uint32_t alive = 0;
+    for (const Face& face : mesh.face) alive += !face.dead();
+    out.mesh.triangle.resize(alive);
+    out.mesh.edge_class.resize(alive);
+    out.cell.resize(alive);
+    out.triangle_changed.resize(alive);
+    out.triangle_map.resize(mesh.face.size());
+    uint32_t next = 0;
     for (uint32_t f = 0; f < mesh.face.size(); ++f) {
         const Face& face = mesh.face[f];
+        out.triangle_map[f] = face.dead() ? kNone : next;
         if (face.dead()) continue;
-        out.triangle_map[f] = uint32_t(out.mesh.triangle.size());
-        Triangle t;
+        Triangle& t = out.mesh.triangle[next];
         bool changed = false;
         for (uint32_t k = 0; k < 3; ++k) {
             t[k] = new_vertex[face.v[k]];
             changed |= out.mesh.position[t[k]] != in.position[in.triangle[f][k]];
         }
-        out.mesh.triangle.push_back(t);
-        out.mesh.edge_class.push_back(uint8_t(face.classes()));
-        out.cell.push_back(uint8_t(face.cell()));
-        out.triangle_changed.push_back(changed);
+        out.mesh.edge_class[next] = uint8_t(face.classes());
+        out.cell[next] = uint8_t(face.cell());
+        out.triangle_changed[next] = changed;
+        ++next;
     }
 }
 
