@@ -14,9 +14,9 @@ namespace pietra {
 
 /// One triangle in one pixel.
 struct ShadeItem {
-    uint32_t number;  ///< of the triangle, in the batch
+    uint32_t triangle;  ///< of the patch
     uint16_t x, y;
-    uint32_t target;  ///< the caller's
+    uint32_t target;  ///< the caller's own
 };
 
 class PixelShader {
@@ -24,21 +24,22 @@ public:
     /// All three must outlive this.
     PixelShader(const View& view, const Projection& projection, const ShadeSettings& settings);
 
-    /// `colour` takes one sRGB colour an item. At most kShadeLanes items.
-    void shade(const Batch& batch, std::span<const ShadeItem> items, Rgba8* colour) const;
+    /// `colour` takes one sRGB colour an item. At least one item of the patch and at most
+    /// kShadeLanes.
+    void shade(const BatchPatch& patch, std::span<const ShadeItem> items, Rgba8* colour) const;
 
 private:
-    struct Source;
-    void gather(const Batch& batch, const ShadeItem& item, size_t lane, Source& source,
+    void gather(const BatchPatch& patch, const ShadeItem& item, size_t lane,
                 ShadeLanes& lanes) const;
-    void giveWeights(const Source& source, const ShadeItem& item, size_t lane,
+    void giveWeights(const BatchPatch& patch, const ShadeItem& item, size_t lane,
                      ShadeLanes& lanes) const;
-    Vec3f baseColour(const Source& source, size_t lane, const ShadeLanes& lanes) const;
+    Vec3f baseColour(const BatchPatch& patch, uint32_t triangle, const Vec3f& weight) const;
+    bool baseIsPatchColour(const BatchPatch& patch) const;
 
     const Projection& projection_;
     const ShadeSettings& settings_;
     ShadeView view_;
-    bool base_is_patch_;  ///< no colour comes from vertices or triangles
+    const uint8_t* bytes_;  ///< of ShadeLanes::lit
 };
 
 }  // namespace pietra
