@@ -153,8 +153,11 @@ void Rasteriser::State::drawChunk(const DrawChunk& chunk, const VisibilityTile& 
     const BatchPatch& patch = *chunk.patch;
     thread_local std::vector<uint32_t> clipped;
     clipped.clear();
-    // All at once, not line by line as the triangles come.
-    for (size_t i = 0; i < patch.mesh().vertexCount(); i += 4) __builtin_prefetch(patch.vertex + i);
+    prefetchBytes(patch.vertex, patch.mesh().vertexCount() * sizeof(ScreenVertex));
+    const PixelBox box = chunk.box.intersected(tile.box);
+    for (int32_t y = box.y0; y < box.y1; ++y)
+        prefetchBytes(tile.key + (size_t(y) * size_t(tile.width) + size_t(box.x0)) * size_t(tile.samples),
+                      size_t(box.x1 - box.x0) * size_t(tile.samples) * sizeof(VisibilityKey));
     drawTriangles(tile,
                   {patch.triangle() + chunk.first, chunk.count, chunk.firstNumber(), patch.vertex,
                    patch.both_sides},

@@ -121,7 +121,13 @@ void resolveChunk(const VisibilityTile& tile, const DrawChunk& chunk, const Pixe
                   Rgba8* colour) {
     Collector collector(*chunk.patch, shader, colour, tile.samples);
     const PixelBox box = tile.box.intersected(chunk.box);
-    for (int32_t y = box.y0; y < box.y1; ++y)
+    const BatchPatch& patch = *chunk.patch;
+    prefetchBytes(patch.triangle() + chunk.first, chunk.count * sizeof(Triangle));
+    prefetchBytes(patch.vertex, patch.mesh().vertexCount() * sizeof(ScreenVertex));
+    const size_t row_bytes = size_t(box.x1 - box.x0) * size_t(tile.samples) * sizeof(VisibilityKey);
+    for (int32_t y = box.y0; y < box.y1; ++y) {
+        const size_t below = size_t(y + 1) * size_t(tile.width) + size_t(box.x0);
+        if (y + 1 < box.y1) prefetchBytes(tile.key + below * size_t(tile.samples), row_bytes);
         for (int32_t x = box.x0; x < box.x1; x += kRun) {
             const int32_t end = std::min(x + kRun, box.x1);
             if (tile.samples == 1)
@@ -129,6 +135,7 @@ void resolveChunk(const VisibilityTile& tile, const DrawChunk& chunk, const Pixe
             else
                 collectFour(tile, chunk, collector, y, x, end);
         }
+    }
 }
 
 }  // namespace pietra
