@@ -27,6 +27,7 @@ void PixelShader::giveWeights(const BatchPatch& patch, const ShadeItem& item, si
         v[k] = Vec3d(projection_.viewPosition(patch.mesh().position[index[k]]));
     const Vec3d ray((double(item.x) + 0.5 - view_.centre_x) * view_.inv_focal,
                     (view_.centre_y - double(item.y) - 0.5) * view_.inv_focal, 1);
+    lanes.any_given = true;
     lanes.given[lane] = -1;
     lanes.given_back[lane] = glm::dot(v[0], glm::cross(v[1], v[2])) > 0 ? -1 : 0;
     double weight[3], sum = 0;
@@ -37,15 +38,26 @@ void PixelShader::giveWeights(const BatchPatch& patch, const ShadeItem& item, si
     for (int k = 0; k < 3; ++k) lanes.given_weight[k][lane] = float(weight[k] / sum);
 }
 
-inline void PixelShader::gather(const BatchPatch& patch, const ShadeItem& item, size_t lane,
-                                ShadeLanes& lanes) const {
-    const Triangle& index = patch.triangle()[item.triangle];
-    for (int k = 0; k < 3; ++k) lanes.corner[k][lane] = patch.vertex[index[k]];
-    lanes.x[lane] = item.x;
-    lanes.y[lane] = item.y;
-    if (!patch.whole)
-        for (int k = 0; k < 3; ++k)
-            if (lanes.corner[k][lane].x == kNoImage) return giveWeights(patch, item, lane, lanes);
+void PixelShader::gather(const BatchPatch& patch, std::span<const ShadeItem> items,
+                         ShadeLanes& lanes) const {
+    const Triangle* triangle = patch.triangle();
+    const size_t last = items.size() - 1;
+    for (size_t i = 0; i < size_t(kShadeLanes); ++i) {
+        const ShadeItem& item = items[std::min(i, last)];
+        const Triangle& index = triangle[item.triangle];
+        for (int k = 0; k < 3; ++k) lanes.corner[k][i] = patch.vertex[index[k]];
+        lanes.x[i] = item.x;
+        lanes.y[i] = item.y;
+    }
+    lanes.both_sides = patch.both_sides;
+    lanes.any_given = false;
+    if (patch.whole) return;
+    for (size_t i = 0; i < size_t(kShadeLanes); ++i) {
+        lanes.given[i] = 0;
+        if (lanes.corner[0][i].x == kNoImage || lanes.corner[1][i].x == kNoImage ||
+            lanes.corner[2][i].x == kNoImage)
+            giveWeights(patch, items[std::min(i, last)], i, lanes);
+    }
 }
 
 bool PixelShader::baseIsPatchColour(const BatchPatch& patch) const {
@@ -81,14 +93,8 @@ Vec3f PixelShader::baseColour(const BatchPatch& patch, uint32_t triangle,
     return settings_.show == Show::kShaded ? patch.colour * linear : linear;
 }
 
-void PixelShader::shade(const BatchPatch& patch, std::span<const ShadeItem> items,
-                        Rgba8* colour) const {
-    ShadeLanes lanes;
-    lanes.both_sides = patch.both_sides;
-    lanes.any_given = !patch.whole;
-    if (lanes.any_given) std::fill_n(lanes.given, kShadeLanes, 0);
-    for (size_t i = 0; i < size_t(kShadeLanes); ++i)
-        gather(patch, items[std::min(i, items.size() - 1)], i, lanes);
+void PixelShader::compute(const BatchPatch& patch, std::span<const ShadeItem> items,
+                          ShadeLanes& lanes) const {
     interpolateLanes(view_, lanes);
     if (baseIsPatchColour(patch)) {
         for (int c = 0; c < 3; ++c) std::fill_n(lanes.base[c], kShadeLanes, patch.colour[c]);
@@ -106,9 +112,6 @@ void PixelShader::shade(const BatchPatch& patch, std::span<const ShadeItem> item
         leaveUnlit(lanes);
     else
         lightLanes(view_, lanes);
-    for (size_t i = 0; i < items.size(); ++i)
-        colour[i] = {bytes_[lanes.lit[0][i]], bytes_[lanes.lit[1][i]], bytes_[lanes.lit[2][i]],
-                     255};
 }
 
 }  // namespace pietra

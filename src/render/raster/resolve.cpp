@@ -26,11 +26,11 @@ class Collector {
 public:
     Collector(const BatchPatch& patch, const PixelShader& shader, Rgba8* colour, int samples)
         : patch_(patch), shader_(shader), colour_(colour), samples_(samples) {}
-    ~Collector() { flush(0); }
+    ~Collector() { flush(true); }
 
     /// Makes room for `count` items; add() without room is undefined.
     void reserve(size_t count) {
-        if (count_ + count > kCapacity) flush(kShadeLanes - 1);
+        if (count_ + count > kCapacity) flush(false);
     }
     /// The item counts only if `keep`: without a branch, as it is anyone's guess.
     void add(const ShadeItem& item, bool keep) {
@@ -41,16 +41,11 @@ public:
 private:
     static constexpr size_t kCapacity = 512;
 
-    /// Shades all but at most `leave` items.
-    void flush(size_t leave) {
-        size_t done = 0;
-        while (count_ - done > leave) {
-            const size_t n = std::min(size_t(kShadeLanes), count_ - done);
-            Rgba8 colour[kShadeLanes];
-            shader_.shade(patch_, {item_ + done, n}, colour);
-            for (size_t i = 0; i < n; ++i) put(item_[done + i].target, colour[i]);
-            done += n;
-        }
+    /// Shades all items, or only whole vectors of them.
+    void flush(bool all) {
+        const size_t done = all ? count_ : count_ / kShadeLanes * kShadeLanes;
+        shader_.shade(patch_, {item_, done},
+                      [&](size_t i, const Rgba8& colour) { put(item_[i].target, colour); });
         std::memmove(item_, item_ + done, (count_ - done) * sizeof(ShadeItem));
         count_ -= done;
     }
