@@ -29,7 +29,7 @@ double decodeSrgb(double srgb) {
 
 struct Tables {
     std::array<float, 256> linear;
-    std::array<uint8_t, kSrgbEntries> srgb;
+    std::array<uint8_t, kSrgbEntries> srgb, plain;
     Tables() {
         for (int i = 0; i < 256; ++i) linear[i] = float(decodeSrgb(i / 255.0));
         int byte = 0;
@@ -37,6 +37,7 @@ struct Tables {
             while (byte < 255 && double(i) / (kSrgbEntries - 1) > decodeSrgb((byte + 0.5) / 255))
                 ++byte;
             srgb[i] = uint8_t(byte);
+            plain[i] = uint8_t((i * 255 * 2 + kSrgbEntries - 1) / (2 * (kSrgbEntries - 1)));
         }
     }
 };
@@ -69,6 +70,9 @@ Vec3f fromHue(float hue, float saturation, float value) {
 
 const uint8_t* srgbTable() {
     return tables().srgb.data();
+}
+const uint8_t* plainTable() {
+    return tables().plain.data();
 }
 const float* linearTable() {
     return tables().linear.data();

@@ -56,6 +56,8 @@ Rgba8 srgbFromLinear(const Vec3f& linear);
 /// The table behind srgbFromLinear: entry round(x * (kSrgbEntries - 1)) for x in [0, 1].
 inline constexpr int kSrgbEntries = 8192;
 const uint8_t* srgbTable();
+/// As long, for what is no light: entry i is round(i * 255 / (kSrgbEntries - 1)).
+const uint8_t* plainTable();
 /// The 256 entries behind linearFromSrgb of bytes.
 const float* linearTable();
 

@@ -1,5 +1,7 @@
 #include "render/raster/shade_kernel.h"
 
+#include "render/shading.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/raster/shade_kernel.cpp"
 #include <hwy/foreach_target.h>
@@ -124,8 +126,8 @@ private:
     HWY_INLINE void useGiven(VF e[3]) {
         const DI di;
         const DF df;
+        if (HWY_LIKELY(!lanes_.any_given)) return;
         const auto given = hn::RebindMask(df, hn::MaskFromVec(hn::Load(di, lanes_.given + at_)));
-        if (HWY_LIKELY(hn::AllFalse(df, given))) return;
         for (int k = 0; k < 3; ++k)
             e[k] = hn::IfThenElse(given, hn::Load(df, lanes_.given_weight[k] + at_), e[k]);
         const auto back =
@@ -144,14 +146,9 @@ private:
     /// A sliver's side may be lost to rounding, and near a silhouette normals point away from faces
     /// that are seen: only both together, or a normal that is clearly wrong, turn it round.
     HWY_INLINE Vec turned(const Vec& n, const Vec& eye) const {
-        const DI di;
-        const DF df;
-        const VF limit = hn::IfThenElse(back_, hn::Zero(df), set(-0.25f));
-        const auto both =
-            hn::RebindMask(df, hn::MaskFromVec(hn::Load(di, lanes_.both_sides + at_)));
-        const MF turn = hn::And(both, hn::Lt(dot(n, eye), limit));
-        const VF sign = hn::IfThenElse(turn, set(-1), set(1));
-        return scaled(n, sign);
+        if (!lanes_.both_sides) return n;
+        const VF limit = hn::IfThenElse(back_, hn::Zero(DF()), set(-0.25f));
+        return scaled(n, hn::IfThenElse(hn::Lt(dot(n, eye), limit), set(-1), set(1)));
     }
 
     HWY_INLINE void store(const Vec& v, float (*out)[kShadeLanes]) const {
@@ -182,6 +179,28 @@ constexpr float kGroundLight[3] = {0.085f, 0.07f, 0.06f};
 constexpr float kEyeLight = 0.10f;
 constexpr float kShine = 0.12f;
 
+HWY_INLINE VI tableIndex(VF linear) {
+    const VF clamped = hn::Min(positive(linear), set(1));
+    return hn::NearestInt(hn::Mul(clamped, set(float(kSrgbEntries - 1))));
+}
+
+void LeaveUnlit(ShadeLanes& lanes) {
+    const DF df;
+    for (int c = 0; c < 3; ++c)
+        for (size_t at = 0; at < size_t(kShadeLanes); at += hn::Lanes(df))
+            hn::Store(tableIndex(hn::Load(df, lanes.base[c] + at)), DI(), lanes.lit[c] + at);
+}
+
+void ShowNormals(ShadeLanes& lanes) {
+    const DF df;
+    const VF half = set(0.5f * float(kSrgbEntries - 1));
+    for (int c = 0; c < 3; ++c)
+        for (size_t at = 0; at < size_t(kShadeLanes); at += hn::Lanes(df)) {
+            const VF n = hn::Load(df, lanes.normal[c] + at);
+            hn::Store(hn::NearestInt(hn::Add(hn::Mul(n, half), half)), DI(), lanes.lit[c] + at);
+        }
+}
+
 void LightLanes(const ShadeView& view, ShadeLanes& lanes) {
     const DF df;
     for (size_t at = 0; at < size_t(kShadeLanes); at += hn::Lanes(df)) {
@@ -205,7 +224,7 @@ void LightLanes(const ShadeView& view, ShadeLanes& lanes) {
             light = hn::Add(light, hn::Mul(sky, set(kSkyLight[c])));
             light = hn::Add(light, hn::Mul(ground, set(kGroundLight[c])));
             const VF diffuse = hn::Mul(light, hn::Load(df, lanes.base[c] + at));
-            hn::Store(hn::Add(diffuse, shine), df, lanes.lit[c] + at);
+            hn::Store(tableIndex(hn::Add(diffuse, shine)), DI(), lanes.lit[c] + at);
         }
     }
 }
@@ -219,6 +238,8 @@ namespace pietra {
 
 HWY_EXPORT(InterpolateLanes);
 HWY_EXPORT(LightLanes);
+HWY_EXPORT(LeaveUnlit);
+HWY_EXPORT(ShowNormals);
 
 void interpolateLanes(const ShadeView& view, ShadeLanes& lanes) {
     HWY_DYNAMIC_DISPATCH(InterpolateLanes)(view, lanes);
@@ -226,6 +247,14 @@ void interpolateLanes(const ShadeView& view, ShadeLanes& lanes) {
 
 void lightLanes(const ShadeView& view, ShadeLanes& lanes) {
     HWY_DYNAMIC_DISPATCH(LightLanes)(view, lanes);
+}
+
+void showNormals(ShadeLanes& lanes) {
+    HWY_DYNAMIC_DISPATCH(ShowNormals)(lanes);
+}
+
+void leaveUnlit(ShadeLanes& lanes) {
+    HWY_DYNAMIC_DISPATCH(LeaveUnlit)(lanes);
 }
 
 }  // namespace pietra

@@ -1,0 +1,136 @@
+#include "render/raster/resolve.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace pietra {
+namespace {
+
+/// The keys of a chunk's triangles; nothing and what is resolved are outside any chunk.
+class KeyRange {
+public:
+    explicit KeyRange(const DrawChunk& chunk)
+        : highest_(lowerWord(chunk.firstNumber())), count_(chunk.count) {}
+    bool holds(VisibilityKey key) const { return highest_ - uint32_t(key) < count_; }
+    /// Of the patch.
+    uint32_t triangle(VisibilityKey key, const DrawChunk& chunk) const {
+        return chunk.first + (highest_ - uint32_t(key));
+    }
+
+private:
+    uint32_t highest_, count_;
+};
+
+/// A buffer of items that shades them as many at a time as the shader takes.
+class Collector {
+public:
+    Collector(const BatchPatch& patch, const PixelShader& shader, Rgba8* colour, int samples)
+        : patch_(patch), shader_(shader), colour_(colour), samples_(samples) {}
+    ~Collector() { flush(true); }
+
+    /// Makes room for `count` items; add() without room is undefined.
+    void reserve(size_t count) {
+        if (count_ + count > kCapacity) flush(false);
+    }
+    /// The item counts only if `keep`: without a branch, as it is anyone's guess.
+    void add(const ShadeItem& item, bool keep) {
+        item_[count_] = item;
+        count_ += keep;
+    }
+
+private:
+    static constexpr size_t kCapacity = 512;
+
+    /// Shades all items, or only whole vectors of them.
+    void flush(bool all) {
+        const size_t done = all ? count_ : count_ / kShadeLanes * kShadeLanes;
+        shader_.shade(patch_, {item_, done},
+                      [&](size_t i, const Rgba8& colour) { put(item_[i].target, colour); });
+        std::memmove(item_, item_ + done, (count_ - done) * sizeof(ShadeItem));
+        count_ -= done;
+    }
+    void put(uint32_t target, const Rgba8& colour) {
+        if (samples_ == 1) {
+            colour_[target] = colour;
+            return;
+        }
+        Rgba8* sample = colour_ + 4 * size_t(target >> 4);
+        for (int s = 0; s < 4; ++s)
+            if (target >> s & 1) sample[s] = colour;
+    }
+
+    const BatchPatch& patch_;
+    const PixelShader& shader_;
+    Rgba8* colour_;
+    int samples_;
+    size_t count_ = 0;
+    ShadeItem item_[kCapacity];
+};
+
+constexpr int32_t kRun = 64;  // pixels between two checks for room
+
+void collectOne(const VisibilityTile& tile, const DrawChunk& chunk, Collector& collector, int32_t y,
+                int32_t x0, int32_t x1) {
+    const KeyRange range(chunk);
+    const size_t row = size_t(y) * size_t(tile.width);
+    collector.reserve(kRun);
+    for (int32_t x = x0; x < x1; ++x) {
+        const size_t pixel = row + size_t(x);
+        const VisibilityKey key = tile.key[pixel];
+        const bool mine = range.holds(key);
+        collector.add({range.triangle(key, chunk), uint16_t(x), uint16_t(y), uint32_t(pixel)},
+                      mine);
+        tile.key[pixel] = mine ? key | kResolved : key;
+    }
+}
+
+/// Each triangle once a pixel, with the mask of its samples.
+void collectFour(const VisibilityTile& tile, const DrawChunk& chunk, Collector& collector,
+                 int32_t y, int32_t x0, int32_t x1) {
+    const KeyRange range(chunk);
+    const size_t row = size_t(y) * size_t(tile.width);
+    collector.reserve(4 * kRun);
+    for (int32_t x = x0; x < x1; ++x) {
+        const size_t pixel = row + size_t(x);
+        VisibilityKey* key = tile.key + 4 * pixel;
+        uint32_t left = 0;
+        for (int s = 0; s < 4; ++s) left |= uint32_t(range.holds(key[s])) << s;
+        if (left == 0) continue;
+        for (int s = 0; s < 4; ++s) {
+            uint32_t mask = 0;
+            for (int t = s; t < 4; ++t) mask |= uint32_t(uint32_t(key[t]) == uint32_t(key[s])) << t;
+            mask &= left;
+            const bool first = mask >> s & 1;
+            collector.add({range.triangle(key[s], chunk), uint16_t(x), uint16_t(y),
+                           uint32_t(pixel << 4) | mask},
+                          first);
+            if (first) left &= ~mask;
+        }
+        for (int s = 0; s < 4; ++s) key[s] = range.holds(key[s]) ? key[s] | kResolved : key[s];
+    }
+}
+
+}  // namespace
+
+void resolveChunk(const VisibilityTile& tile, const DrawChunk& chunk, const PixelShader& shader,
+                  Rgba8* colour) {
+    Collector collector(*chunk.patch, shader, colour, tile.samples);
+    const PixelBox box = tile.box.intersected(chunk.box);
+    const BatchPatch& patch = *chunk.patch;
+    prefetchBytes(patch.triangle() + chunk.first, chunk.count * sizeof(Triangle));
+    prefetchBytes(patch.vertex, patch.mesh().vertexCount() * sizeof(ScreenVertex));
+    const size_t row_bytes = size_t(box.x1 - box.x0) * size_t(tile.samples) * sizeof(VisibilityKey);
+    for (int32_t y = box.y0; y < box.y1; ++y) {
+        const size_t below = size_t(y + 1) * size_t(tile.width) + size_t(box.x0);
+        if (y + 1 < box.y1) prefetchBytes(tile.key + below * size_t(tile.samples), row_bytes);
+        for (int32_t x = box.x0; x < box.x1; x += kRun) {
+            const int32_t end = std::min(x + kRun, box.x1);
+            if (tile.samples == 1)
+                collectOne(tile, chunk, collector, y, x, end);
+            else
+                collectFour(tile, chunk, collector, y, x, end);
+        }
+    }
+}
+
+}  // namespace pietra
