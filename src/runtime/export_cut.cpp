@@ -152,7 +152,7 @@ private:
 
 }  // namespace
 
-MeshOutput meshOutputOf(const ModelReader& model) {
+MeshOutput meshOutputOf(const ModelReader& model, const Cut& cut) {
     const ModelInfo& info = model.info();
     Box3d box;
     box.add(info.lattice.toInput(info.bounds.min));
@@ -161,6 +161,7 @@ MeshOutput meshOutputOf(const ModelReader& model) {
     output.schema = info.schema;
     output.double_positions = needsDoubles(box, info.lattice.vertexStep());
     output.centre = 0.5 * (box.min + box.max);
+    output.expected_triangles = cut.triangles;
     output.comment = "extracted by pietra";
     return output;
 }

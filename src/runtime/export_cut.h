@@ -23,8 +23,8 @@ struct ExportReport {
     bool repeated = false;  ///< memory ran out: some border vertices may be there several times
 };
 
-/// How the mesh file of a cut of this model is to be opened.
-MeshOutput meshOutputOf(const ModelReader& model);
+/// How the mesh file of this cut is to be opened. Of counts only the triangles are known before.
+MeshOutput meshOutputOf(const ModelReader& model, const Cut& cut);
 
 /// Writes the cut and finishes the file. `progress`: a stage the caller has begun; ticks once a
 /// node. At most `in_flight` pages are decoded ahead.

@@ -121,7 +121,7 @@ int ExtractVerb::run(const RunContext& context) {
             fmt::format("the coarsest form has {} triangles, more than asked for: it is written",
                         cut.triangles));
 
-    const auto writer = createMesh(output_, context.common.force, meshOutputOf(model));
+    const auto writer = createMesh(output_, context.common.force, meshOutputOf(model, cut));
     context.progress.setStages(1);
     context.progress.beginStage("extract", cut.nodes.size());
     const ExportReport report = exportCut(model, cut, *writer, budget, in_flight, context.progress);
