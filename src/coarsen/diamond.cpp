@@ -13,7 +13,8 @@ constexpr uint32_t kNoVertex = ~0u;
 // Diamonds of the top levels are few: there, halving to the end costs nothing and makes small
 // roots.
 constexpr int kTopLevels = 6;
-constexpr uint32_t kSmallestPatch = 250;
+constexpr uint32_t kSmallTopPatch = 250;
+constexpr uint32_t kSmallestPatch = 64;  // below this there is nothing to gain
 
 void copyVertex(const Mesh& from, uint32_t v, int scalar_count, Mesh& to) {
     to.position.push_back(from.position[v]);
@@ -28,8 +29,9 @@ void copyVertex(const Mesh& from, uint32_t v, int scalar_count, Mesh& to) {
 uint32_t cellQuota(uint64_t children_triangles, uint32_t patch_triangles, int level) {
     const uint64_t half = (children_triangles + 1) / 2;
     const uint64_t wanted =
-        level < kTopLevels ? std::min(kSmallestPatch, patch_triangles / 2) : patch_triangles / 2;
-    return uint32_t(std::max(half, std::min(children_triangles * 63 / 100, wanted)));
+        level < kTopLevels ? std::min(kSmallTopPatch, patch_triangles / 2) : patch_triangles / 2;
+    const uint64_t quota = std::max(half, std::min(children_triangles * 63 / 100, wanted));
+    return uint32_t(std::max(quota, std::min<uint64_t>(children_triangles, kSmallestPatch)));
 }
 
 void DiamondWorker::addCell(const CellMesh& child, uint8_t label) {

@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 
 namespace pietra {
 
 ByteReader::ByteReader(std::unique_ptr<ByteSource> source)
-    : source_(std::move(source)), buffer_(kWindow + kPadding) {}
+    : source_(std::move(source)),
+      window_(size_t(std::min<uint64_t>(kWindow, source_->lengthBound()))),
+      buffer_(window_ + kPadding) {}
 
 void ByteReader::seek(uint64_t offset) {
     if (offset >= base_ && offset - base_ <= end_) {
@@ -23,7 +26,7 @@ void ByteReader::fill() {
     base_ += cursor_;
     end_ -= cursor_;
     cursor_ = 0;
-    end_ += source_->read(base_ + end_, buffer_.data() + end_, kWindow - end_);
+    end_ += source_->read(base_ + end_, buffer_.data() + end_, window_ - end_);
     std::memset(buffer_.data() + end_, 0, kPadding);
 }
 

@@ -46,6 +46,7 @@ private:
     void fill();
 
     std::unique_ptr<ByteSource> source_;
+    size_t window_;  ///< kWindow, or the whole of a smaller file
     std::vector<uint8_t> buffer_;
     uint64_t base_ = 0;  ///< offset of buffer_[0]
     size_t cursor_ = 0;

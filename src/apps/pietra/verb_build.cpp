@@ -49,7 +49,11 @@ void checkFolder(const std::string& path) {
 PrecisionSetting parsePrecision(const std::string& word) {
     if (word == "auto") return {PrecisionSetting::Kind::kAuto, 0};
     if (word == "finest") return {PrecisionSetting::Kind::kFinest, 0};
-    return {PrecisionSetting::Kind::kStep, parseNumber(word, {.min = 0, .above = true})};
+    try {
+        return {PrecisionSetting::Kind::kStep, parseNumber(word, {.min = 0, .above = true})};
+    } catch (const UsageError&) {
+        throw UsageError(fmt::format("'{}' is neither auto nor finest nor a number above 0", word));
+    }
 }
 
 class BuildVerb : public Verb {
@@ -190,7 +194,10 @@ Json BuildVerb::report(const BuildReport& result, const BuildSettings& settings,
              {{"triangles", result.input_triangles},
               {"vertices", result.input_vertices},
               {"bytes", input_bytes},
-              {"files", inputs_.size()}}},
+              {"files", inputs_.size()},
+              {"border_edges", result.border_edges},
+              {"non_manifold_edges", result.non_manifold_edges},
+              {"inconsistent_edges", result.inconsistent_edges}}},
             {"seconds", times},
             {"triangles_per_second", double(result.input_triangles) / seconds},
             {"peak_rss_bytes", peakResidentBytes()},
@@ -202,12 +209,8 @@ Json BuildVerb::report(const BuildReport& result, const BuildSettings& settings,
             {"dropped",
              {{"degenerate", result.dropped_degenerate}, {"duplicate", result.dropped_duplicate}}},
             {"resumed", false},
-            {"triangles_stored", result.stored_triangles},
             {"nodes", result.nodes},
             {"levels", result.levels},
-            {"border_edges", result.border_edges},
-            {"non_manifold_edges", result.non_manifold_edges},
-            {"inconsistent_edges", result.inconsistent_edges},
             {"notes", result.notes}};
 }
 

@@ -6,7 +6,10 @@ VerbTable makeVerbs() {
     VerbTable verbs;
     verbs.push_back(makeBuildVerb());
     verbs.push_back(makeInfoVerb());
+    verbs.push_back(makeCheckVerb());
+    verbs.push_back(makeExtractVerb());
     verbs.push_back(makeRenderVerb());
+    verbs.push_back(makeCompareVerb());
     return verbs;
 }
 

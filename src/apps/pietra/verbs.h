@@ -10,7 +10,10 @@ namespace pietra {
 
 std::unique_ptr<Verb> makeBuildVerb();
 std::unique_ptr<Verb> makeInfoVerb();
+std::unique_ptr<Verb> makeCheckVerb();
+std::unique_ptr<Verb> makeExtractVerb();
 std::unique_ptr<Verb> makeRenderVerb();
+std::unique_ptr<Verb> makeCompareVerb();
 
 using VerbTable = std::vector<std::unique_ptr<Verb>>;
 
