@@ -32,9 +32,8 @@ public:
     /// MemoryError naming `what`. The file will lie in `temp_dir`, if it comes to that.
     ExternalSort(Budget& budget, size_t memory_bytes, uint64_t expected, std::string temp_dir,
                  std::string what)
-        : capacity_(size_t(std::clamp<uint64_t>(expected, 1,
-                                                std::max<size_t>(memory_bytes / sizeof(Record),
-                                                                 kLeastRecords)))),
+        : capacity_(size_t(std::clamp<uint64_t>(
+              expected, 1, std::max<size_t>(memory_bytes / sizeof(Record), kLeastRecords)))),
           temp_dir_(std::move(temp_dir)),
           what_(std::move(what)),
           reservation_(budget.reserve(capacity_ * sizeof(Record), what_)),
