@@ -107,6 +107,7 @@ MeshOutput meshOutputOf(const ModelReader& model, const Cut& cut) {
     output.schema = info.schema;
     output.double_positions = needsDoubles(box, info.lattice.vertexStep());
     output.centre = 0.5 * (box.min + box.max);
+    output.expected_triangles = cut.triangles;
     output.comment = "extracted by pietra";
     output.expected_triangles = cut.triangles;
     return output;

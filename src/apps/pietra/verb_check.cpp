@@ -228,12 +228,13 @@ CertificateSummary CheckVerb::audit(const ModelReader& model, const PatchStream&
                                     Budget& budget, Progress& progress) const {
     CertificateSummary summary;
     if (samples_ == 0) return summary;
-    progress.beginStage("certificate", 0);
     const std::vector<uint16_t> heights = Forest(model.nodes()).groupHeights();
     const int top = heights.empty() ? 0 : *std::max_element(heights.begin(), heights.end());
     std::vector<Cut> cuts;
     for (int height = input_.empty() ? 1 : 0; height <= top; ++height)
         cuts.push_back(cutByHeight(model.nodes(), height));
+    progress.beginStage("certificate", 0);
+    if (cuts.empty()) return summary;  // one resolution only, nothing to compare it with
     const auto reports = auditCuts(model, cuts, stream, budget);
     summary.done = true;
     summary.cuts = cuts.size();

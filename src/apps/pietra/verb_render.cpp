@@ -44,6 +44,7 @@ private:
     Culling culling() const;
     OfflineSettings settings(const Scene& scene) const;
     void showScalar(const Scene& scene, ShadeSettings& shade) const;
+    OfflinePicture draw(const Scene& scene, const Camera& camera, Progress& progress) const;
     Json report(const OfflineStatistics& statistics, size_t resident_bytes) const;
 
     std::vector<std::string> files_;
@@ -202,6 +203,15 @@ Json RenderVerb::report(const OfflineStatistics& s, size_t resident_bytes) const
             {"tolerance_px", pixels_}};
 }
 
+OfflinePicture RenderVerb::draw(const Scene& scene, const Camera& camera,
+                                Progress& progress) const {
+    try {
+        return drawModels(scene.views(), camera, size_, settings(scene), progress);
+    } catch (const MemoryError& error) {
+        throw MemoryError(fmt::format("--ram {}: {}", formatBytes(ram_), error.what()));
+    }
+}
+
 int RenderVerb::run(const RunContext& context) {
     const size_t resident_before = residentBytes();
     if (renderer_ == "gl")
@@ -212,8 +222,7 @@ int RenderVerb::run(const RunContext& context) {
     const Scene scene(files_);
     const Camera camera = camera_.camera(scene.bounds(), size_);
     context.progress.setStages(1);
-    const OfflinePicture drawn =
-        drawModels(scene.views(), camera, size_, settings(scene), context.progress);
+    const OfflinePicture drawn = draw(scene, camera, context.progress);
     const size_t resident = peakResidentBytes();
     writePng(drawn.picture, output_, context.common.force);
     logInfo(fmt::format("{}: {} triangles in {} patches, {:.0f} ms", output_,

@@ -118,9 +118,7 @@ private:
         // The page that fills a batch may exceed it; with screen vertices it is twice as large.
         const size_t least = fixed_bytes_ + 2 * page;
         if (least > settings_.memory_bytes)
-            throw MemoryError(
-                fmt::format("drawing this picture needs {} of memory at least, {} were given",
-                            formatBytes(least), formatBytes(settings_.memory_bytes)));
+            throw MemoryError(fmt::format("drawing this needs {} at least", formatBytes(least)));
         batch_bytes_ = std::min(settings_.memory_bytes - least, kLargestBatch);
         result_.statistics.resident_bytes = fixed_bytes_;
     }
