@@ -3,7 +3,6 @@
 // chunks. Entries are never deleted; a stale one shows by its stamp. Push and pop take constant
 // time.
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -35,18 +34,24 @@ public:
         chunk.entry[chunk.count++] = entry;
     }
 
-    /// Takes up to `room` entries of the lowest bucket, those pushed last first. 0: empty.
-    uint32_t popBatch(Entry* entries, uint32_t room) {
-        for (uint32_t word = 0; word < occupied_.size(); ++word) {
-            if (occupied_[word] == 0) continue;
-            const uint32_t bucket = word * 64 + uint32_t(std::countr_zero(occupied_[word]));
-            Chunk& chunk = chunks_[head_[bucket]];
-            const uint32_t taken = std::min(room, chunk.count);
-            for (uint32_t i = 0; i < taken; ++i) entries[i] = chunk.entry[--chunk.count];
-            if (chunk.count == 0) dropChunk(bucket);
-            return taken;
-        }
-        return 0;
+    static constexpr uint32_t kNoBucket = 512;
+
+    /// The lowest bucket with entries, or kNoBucket.
+    uint32_t lowestBucket() const {
+        for (uint32_t word = 0; word < occupied_.size(); ++word)
+            if (occupied_[word] != 0)
+                return word * 64 + uint32_t(std::countr_zero(occupied_[word]));
+        return kNoBucket;
+    }
+
+    bool empty(uint32_t bucket) const { return head_[bucket] == kEnd; }
+
+    /// Takes the entry pushed last into `bucket`, which must not be empty.
+    Entry pop(uint32_t bucket) {
+        Chunk& chunk = chunks_[head_[bucket]];
+        const Entry entry = chunk.entry[--chunk.count];
+        if (chunk.count == 0) dropChunk(bucket);
+        return entry;
     }
 
 private:

@@ -92,6 +92,13 @@ uint8_t mixBytes(uint8_t a, uint8_t b, float t) {
 
 }  // namespace
 
+/// Edges taken from the queue to be collapsed.
+struct Candidates {
+    EdgeBatch edges;
+    std::array<uint32_t, kBatch> stamp;
+    uint32_t count = 0;
+};
+
 struct Simplifier::State {
     WorkingMesh mesh;
     PositionSet positions;
@@ -118,8 +125,11 @@ struct Simplifier::State {
     bool stillThere(uint32_t u, uint32_t v, uint32_t stamp) const {
         return mesh.stamp[u] + mesh.stamp[v] == stamp;
     }
-    uint32_t popCandidates(EdgeBatch& batch, uint32_t* stamps);
-    uint32_t drainQueue();
+    void popCandidates(Candidates& batch);
+    void collapseCandidates(Candidates& batch);
+    void drainQueue();
+    Candidates candidates;
+    uint32_t collapses = 0;
     float worst_deviation_sq = 0;
     void mixAttributes(uint32_t removed, uint32_t kept, const Vec3f& from, const Vec3f& to,
                        const Vec3f& at);
@@ -166,6 +176,7 @@ void Simplifier::State::load(const SimplifyInput& input) {
     grid.high = Vec3f(Vec3i(kLatticeMax) - mesh.centre);
     queue.clear();
     worst_deviation_sq = 0;
+    collapses = 0;
 }
 
 void Simplifier::State::buildPositions() {
@@ -243,53 +254,49 @@ void Simplifier::State::mixAttributes(uint32_t removed, uint32_t kept, const Vec
     }
 }
 
-/// Up to eight edges from the lowest bucket, as they are now, with their places. 0: none left.
-uint32_t Simplifier::State::popCandidates(EdgeBatch& batch, uint32_t* stamps) {
-    uint32_t count = 0;
-    while (count == 0) {
-        std::array<CollapseQueue::Entry, kBatch> entries;
-        const uint32_t popped = queue.popBatch(entries.data(), kBatch);
-        if (popped == 0) return 0;
-        for (uint32_t i = 0; i < popped; ++i) {
-            const auto& e = entries[i];
-            if (!stillThere(e.u, e.v, e.stamp)) continue;
-            const bool swap = mesh.point[e.u].rank() > mesh.point[e.v].rank();
-            batch.u[count] = swap ? e.v : e.u;
-            batch.v[count] = swap ? e.u : e.v;
-            stamps[count++] = e.stamp;
-        }
+/// Edges of the lowest bucket as they are now, up to sixteen; fewer, or none, where it has no more.
+void Simplifier::State::popCandidates(Candidates& batch) {
+    batch.count = 0;
+    const uint32_t bucket = queue.lowestBucket();
+    if (bucket == CollapseQueue::kNoBucket) return;
+    while (batch.count < kBatch && !queue.empty(bucket)) {
+        const CollapseQueue::Entry e = queue.pop(bucket);
+        if (!stillThere(e.u, e.v, e.stamp)) continue;
+        const bool swap = mesh.point[e.u].rank() > mesh.point[e.v].rank();
+        batch.edges.u[batch.count] = swap ? e.v : e.u;
+        batch.edges.v[batch.count] = swap ? e.u : e.v;
+        batch.stamp[batch.count++] = e.stamp;
     }
-    for (uint32_t i = count; i < kBatch; ++i) {
-        batch.u[i] = batch.u[0];
-        batch.v[i] = batch.v[0];
-    }
-    kernels.place(mesh.point.data(), mesh.quadric.data(), grid, batch);
-    return count;
 }
 
-uint32_t Simplifier::State::drainQueue() {
-    uint32_t collapses = 0;
-    EdgeBatch batch;
-    std::array<uint32_t, kBatch> stamps;
-    while (mesh.cells_above > 0) {
-        const uint32_t count = popCandidates(batch, stamps.data());
-        if (count == 0) break;
-        for (uint32_t i = 0; i < count && mesh.cells_above > 0; ++i) {
-            const uint32_t u = batch.u[i], v = batch.v[i];
-            if (!stillThere(u, v, stamps[i])) continue;
-            const Vec3f from = mesh.point[u].vec(), to = mesh.point[v].vec();
-            const Vec3f at{batch.x[i], batch.y[i], batch.z[i]};
-            if (!collapser.tryCollapse(u, v, at)) continue;
-            ++collapses;
-            if (!positions.insert(mesh, v)) buildPositions();
-            const float area = mesh.quadric[v].area;
-            if (area > 0) worst_deviation_sq = std::max(worst_deviation_sq, batch.cost[i] / area);
-            mixAttributes(u, v, from, to, at);
-            pushEdgesAround(v);
-        }
-        flushPending();
+void Simplifier::State::collapseCandidates(Candidates& batch) {
+    EdgeBatch& edges = batch.edges;
+    for (uint32_t i = batch.count; i < kBatch; ++i) {
+        edges.u[i] = edges.u[0];
+        edges.v[i] = edges.v[0];
     }
-    return collapses;
+    kernels.place(mesh.point.data(), mesh.quadric.data(), grid, edges);
+    for (uint32_t i = 0; i < batch.count && mesh.cells_above > 0; ++i) {
+        const uint32_t u = edges.u[i], v = edges.v[i];
+        if (!stillThere(u, v, batch.stamp[i])) continue;
+        const Vec3f from = mesh.point[u].vec(), to = mesh.point[v].vec();
+        const Vec3f at{edges.x[i], edges.y[i], edges.z[i]};
+        if (!collapser.tryCollapse(u, v, at)) continue;
+        ++collapses;
+        if (!positions.insert(mesh, v)) buildPositions();
+        const float area = mesh.quadric[v].area;
+        if (area > 0) worst_deviation_sq = std::max(worst_deviation_sq, edges.cost[i] / area);
+        mixAttributes(u, v, from, to, at);
+        pushEdgesAround(v);
+    }
+    flushPending();
+}
+
+void Simplifier::State::drainQueue() {
+    while (mesh.cells_above > 0 && queue.lowestBucket() != CollapseQueue::kNoBucket) {
+        popCandidates(candidates);
+        if (candidates.count > 0) collapseCandidates(candidates);
+    }
 }
 
 void Simplifier::State::fallBack(float droppable_error, SimplifyOutput& output) {
@@ -372,13 +379,14 @@ void Simplifier::run(const SimplifyInput& input, SimplifyOutput& output) {
     output.locked_vertices = classifyVertices(s.mesh);
     buildQuadrics(s.mesh);
     s.buildPositions();
-    output.collapses = output.clustered = output.dropped_triangles = 0;
+    output.clustered = output.dropped_triangles = 0;
     while (s.mesh.cells_above > 0) {
         s.pushAllEdges();
-        const uint32_t collapses = s.drainQueue();
-        if (collapses == 0) break;
-        output.collapses += collapses;
+        const uint32_t before = s.collapses;
+        s.drainQueue();
+        if (s.collapses == before) break;
     }
+    output.collapses = s.collapses;
     output.estimated_error = std::sqrt(s.worst_deviation_sq);
     if (s.mesh.cells_above > 0) s.fallBack(input.droppable_error, output);
     s.store(input, output);
