@@ -25,8 +25,8 @@ void PixelShader::giveWeights(const BatchPatch& patch, const ShadeItem& item, si
     Vec3d v[3];
     for (int k = 0; k < 3; ++k)
         v[k] = Vec3d(projection_.viewPosition(patch.mesh().position[index[k]]));
-    const Vec3d ray((double(item.x) + 0.5 - view_.centre_x) * view_.inv_focal,
-                    (view_.centre_y - double(item.y) - 0.5) * view_.inv_focal, 1);
+    const Vec3d ray((double(item.x()) + 0.5 - view_.centre_x) * view_.inv_focal,
+                    (view_.centre_y - double(item.y()) - 0.5) * view_.inv_focal, 1);
     lanes.any_given = true;
     lanes.given[lane] = -1;
     lanes.given_back[lane] = glm::dot(v[0], glm::cross(v[1], v[2])) > 0 ? -1 : 0;
@@ -46,8 +46,7 @@ void PixelShader::gather(const BatchPatch& patch, std::span<const ShadeItem> ite
         const ShadeItem& item = items[std::min(i, last)];
         const Triangle& index = triangle[item.triangle];
         for (int k = 0; k < 3; ++k) lanes.corner[k][i] = patch.vertex[index[k]];
-        lanes.x[i] = item.x;
-        lanes.y[i] = item.y;
+        lanes.place[i] = int32_t(item.place);
     }
     lanes.both_sides = patch.both_sides;
     lanes.any_given = false;

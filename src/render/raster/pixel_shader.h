@@ -17,8 +17,15 @@ namespace pietra {
 /// One triangle in one pixel.
 struct ShadeItem {
     uint32_t triangle;  ///< of the patch
-    uint16_t x, y;
-    uint32_t target;  ///< the caller's own
+    uint32_t place;  ///< of the pixel, and which samples: x, y and mask, from the low bits upwards
+
+    static ShadeItem at(uint32_t triangle, int32_t x, int32_t y, uint32_t sample_mask) {
+        return {triangle,
+                uint32_t(x) | uint32_t(y) << kPlaceBits | sample_mask << (2 * kPlaceBits)};
+    }
+    int32_t x() const { return int32_t(place & kPlaceMask); }
+    int32_t y() const { return int32_t(place >> kPlaceBits & kPlaceMask); }
+    uint32_t sampleMask() const { return place >> (2 * kPlaceBits); }
 };
 
 class PixelShader {

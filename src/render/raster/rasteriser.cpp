@@ -70,6 +70,7 @@ struct Rasteriser::State {
 
 void Rasteriser::State::begin() {
     picture.size = view.size();
+    CHECK_LE(std::max(picture.size.width, picture.size.height), kMaxPictureSide);
     picture.focal_px = view.focal_px();
     const size_t pixels = picture.pixelCount();
     picture.colour.resize(pixels);

@@ -24,8 +24,9 @@ private:
 /// A buffer of items that shades them as many at a time as the shader takes.
 class Collector {
 public:
-    Collector(const BatchPatch& patch, const PixelShader& shader, Rgba8* colour, int samples)
-        : patch_(patch), shader_(shader), colour_(colour), samples_(samples) {}
+    Collector(const BatchPatch& patch, const PixelShader& shader, const VisibilityTile& tile,
+              Rgba8* colour)
+        : patch_(patch), shader_(shader), tile_(tile), colour_(colour) {}
     ~Collector() { flush(true); }
 
     /// Makes room for `count` items; add() without room is undefined.
@@ -45,24 +46,25 @@ private:
     void flush(bool all) {
         const size_t done = all ? count_ : count_ / kShadeLanes * kShadeLanes;
         shader_.shade(patch_, {item_, done},
-                      [&](size_t i, const Rgba8& colour) { put(item_[i].target, colour); });
+                      [&](size_t i, const Rgba8& colour) { put(item_[i], colour); });
         std::memmove(item_, item_ + done, (count_ - done) * sizeof(ShadeItem));
         count_ -= done;
     }
-    void put(uint32_t target, const Rgba8& colour) {
-        if (samples_ == 1) {
-            colour_[target] = colour;
+    void put(const ShadeItem& item, const Rgba8& colour) {
+        const size_t pixel = size_t(item.y()) * size_t(tile_.width) + size_t(item.x());
+        if (tile_.samples == 1) {
+            colour_[pixel] = colour;
             return;
         }
-        Rgba8* sample = colour_ + 4 * size_t(target >> 4);
-        for (int s = 0; s < 4; ++s)
-            if (target >> s & 1) sample[s] = colour;
+        const uint32_t mask = item.sampleMask();
+        for (size_t s = 0; s < 4; ++s)
+            if (mask >> s & 1) colour_[4 * pixel + s] = colour;
     }
 
     const BatchPatch& patch_;
     const PixelShader& shader_;
+    const VisibilityTile& tile_;
     Rgba8* colour_;
-    int samples_;
     size_t count_ = 0;
     ShadeItem item_[kCapacity];
 };
@@ -78,8 +80,7 @@ void collectOne(const VisibilityTile& tile, const DrawChunk& chunk, Collector& c
         const size_t pixel = row + size_t(x);
         const VisibilityKey key = tile.key[pixel];
         const bool mine = range.holds(key);
-        collector.add({range.triangle(key, chunk), uint16_t(x), uint16_t(y), uint32_t(pixel)},
-                      mine);
+        collector.add(ShadeItem::at(range.triangle(key, chunk), x, y, 1), mine);
         tile.key[pixel] = mine ? key | kResolved : key;
     }
 }
@@ -101,9 +102,7 @@ void collectFour(const VisibilityTile& tile, const DrawChunk& chunk, Collector& 
             for (int t = s; t < 4; ++t) mask |= uint32_t(uint32_t(key[t]) == uint32_t(key[s])) << t;
             mask &= left;
             const bool first = mask >> s & 1;
-            collector.add({range.triangle(key[s], chunk), uint16_t(x), uint16_t(y),
-                           uint32_t(pixel << 4) | mask},
-                          first);
+            collector.add(ShadeItem::at(range.triangle(key[s], chunk), x, y, mask), first);
             if (first) left &= ~mask;
         }
         for (int s = 0; s < 4; ++s) key[s] = range.holds(key[s]) ? key[s] | kResolved : key[s];
@@ -114,7 +113,7 @@ void collectFour(const VisibilityTile& tile, const DrawChunk& chunk, Collector& 
 
 void resolveChunk(const VisibilityTile& tile, const DrawChunk& chunk, const PixelShader& shader,
                   Rgba8* colour) {
-    Collector collector(*chunk.patch, shader, colour, tile.samples);
+    Collector collector(*chunk.patch, shader, tile, colour);
     const PixelBox box = tile.box.intersected(chunk.box);
     const BatchPatch& patch = *chunk.patch;
     prefetchBytes(patch.triangle() + chunk.first, chunk.count * sizeof(Triangle));

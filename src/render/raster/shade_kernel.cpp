@@ -46,21 +46,18 @@ HWY_INLINE Vec normalized(const Vec& a) {
     return scaled(a, hn::IfThenElseZero(hn::Gt(square, hn::Zero(DF())), inverse));
 }
 
-/// decodeNormal() of octahedral.h; the two numbers are the halves of a lane.
+/// The direction of decodeNormal() of octahedral.h, not of unit length; the two numbers are the
+/// halves of a lane.
 HWY_INLINE Vec decode(VI packed) {
     const DF df;
-    const VF scale = set(32767.0f), one = set(1), zero = hn::Zero(df);
-    VF x = hn::Div(hn::ConvertTo(df, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed))), scale);
-    VF y = hn::Div(hn::ConvertTo(df, hn::ShiftRight<16>(packed)), scale);
+    const VF one = set(32767.0f), zero = hn::Zero(df);
+    const VF x = hn::ConvertTo(df, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed)));
+    const VF y = hn::ConvertTo(df, hn::ShiftRight<16>(packed));
     const VF z = hn::Sub(hn::Sub(one, hn::Abs(x)), hn::Abs(y));
     const MF folded = hn::Lt(z, zero);
-    const VF folded_x =
-        hn::Mul(hn::Sub(one, hn::Abs(y)), hn::IfThenElse(hn::Lt(x, zero), set(-1), one));
-    const VF folded_y =
-        hn::Mul(hn::Sub(one, hn::Abs(x)), hn::IfThenElse(hn::Lt(y, zero), set(-1), one));
-    x = hn::IfThenElse(folded, folded_x, x);
-    y = hn::IfThenElse(folded, folded_y, y);
-    return normalized({x, y, z});
+    const VF folded_x = hn::CopySign(hn::Sub(one, hn::Abs(y)), x);
+    const VF folded_y = hn::CopySign(hn::Sub(one, hn::Abs(x)), y);
+    return {hn::IfThenElse(folded, folded_x, x), hn::IfThenElse(folded, folded_y, y), z};
 }
 
 /// One vector of lanes, from `at` on.
@@ -71,13 +68,11 @@ public:
 
     HWY_INLINE void run() {
         const DI di;
-        const VI pixel_x = hn::Load(di, lanes_.x + at_), pixel_y = hn::Load(di, lanes_.y + at_);
+        const VI place = hn::Load(di, lanes_.place + at_), mask = hn::Set(di, kPlaceMask);
+        const VI pixel_x = hn::And(place, mask);
+        const VI pixel_y = hn::And(hn::ShiftRight<kPlaceBits>(place), mask);
         findWeights(pixel_x, pixel_y);
-        Vec world = scaled(decode(normal_[0]), weight_[0]);
-        for (int k = 1; k < 3; ++k) {
-            const Vec n = scaled(decode(normal_[k]), weight_[k]);
-            world = {hn::Add(world.x, n.x), hn::Add(world.y, n.y), hn::Add(world.z, n.z)};
-        }
+        const Vec world = interpolatedNormal();
         const Vec n =
             normalized({dot(world, view_.right), dot(world, view_.up), dot(world, view_.back)});
         const Vec eye = toEye(pixel_x, pixel_y);
@@ -110,17 +105,16 @@ private:
         back_ = hn::Gt(hn::Add(hn::Add(e[0], e[1]), e[2]), hn::Zero(df));
         for (int k = 0; k < 3; ++k) e[k] = hn::Mul(e[k], inv_depth[k]);
         useGiven(e);
-        // Positive where the pixel's centre is inside, whatever the orientation; else the nearest
-        // point of the triangle, about.
-        const VF inverse = hn::Div(set(1), hn::Add(hn::Add(e[0], e[1]), e[2]));
-        for (int k = 0; k < 3; ++k) e[k] = positive(hn::Mul(e[k], inverse));
+        // Of the sign of their sum where the pixel's centre is inside; else the nearest point of
+        // the triangle, about.
+        const VF direction = hn::Add(hn::Add(e[0], e[1]), e[2]);
+        for (int k = 0; k < 3; ++k) e[k] = positive(hn::Mul(e[k], hn::CopySign(set(1), direction)));
         const VF sum = hn::Add(hn::Add(e[0], e[1]), e[2]);
-        // Not so for a sliver whose area is lost to rounding, where everything is inf or NaN.
-        const MF usable = hn::And(hn::Gt(sum, hn::Zero(df)), hn::Lt(sum, set(1e30f)));
-        const VF normalise = hn::Div(set(1), sum);
+        // Zero for a sliver whose area is lost to rounding.
+        const VF inverse = hn::Div(set(1), sum);
+        const MF usable = hn::Gt(sum, hn::Zero(df));
         for (int k = 0; k < 3; ++k)
-            weight_[k] =
-                hn::IfThenElse(usable, hn::Mul(e[k], normalise), set(k == 0 ? 1.0f : 0.0f));
+            weight_[k] = hn::IfThenElse(usable, hn::Mul(e[k], inverse), set(k == 0 ? 1.0f : 0.0f));
     }
 
     HWY_INLINE void useGiven(VF e[3]) {
@@ -133,6 +127,26 @@ private:
         const auto back =
             hn::RebindMask(df, hn::MaskFromVec(hn::Load(di, lanes_.given_back + at_)));
         back_ = hn::Or(hn::And(given, back), hn::AndNot(given, back_));
+    }
+
+    /// The weighted sum of the corners' unit normals, of any length: multiplied by all three
+    /// lengths it needs no division.
+    HWY_INLINE Vec interpolatedNormal() const {
+        Vec n[3];
+        VF square[3];
+        for (int k = 0; k < 3; ++k) {
+            n[k] = decode(normal_[k]);
+            square[k] = dot(n[k], n[k]);
+        }
+        Vec sum;
+        for (int k = 0; k < 3; ++k) {
+            const VF lengths = hn::Sqrt(hn::Mul(square[(k + 1) % 3], square[(k + 2) % 3]));
+            const Vec part = scaled(n[k], hn::Mul(weight_[k], lengths));
+            sum = k == 0
+                      ? part
+                      : Vec{hn::Add(sum.x, part.x), hn::Add(sum.y, part.y), hn::Add(sum.z, part.z)};
+        }
+        return sum;
     }
 
     HWY_INLINE Vec toEye(VI pixel_x, VI pixel_y) const {

@@ -12,10 +12,15 @@ namespace pietra {
 /// Pixels shaded together, whatever the SIMD level.
 inline constexpr int kShadeLanes = 16;
 
+/// Pictures have at most 2^kPlaceBits columns and rows.
+inline constexpr int kPlaceBits = 14;
+inline constexpr int32_t kPlaceMask = (1 << kPlaceBits) - 1;
+
 struct alignas(64) ShadeLanes {
     // Set by the caller.
     ScreenVertex corner[3][kShadeLanes];
-    int32_t x[kShadeLanes], y[kShadeLanes];  ///< pixel
+    int32_t place[kShadeLanes];  ///< of the pixel: x, y * 2^kPlaceBits, and bits that do not matter
+                                 ///< here
     /// Where `given` is -1 a corner has no image, and perspective-correct weights (of any sum but
     /// 0) and facing are the caller's.
     int32_t given[kShadeLanes], given_back[kShadeLanes];

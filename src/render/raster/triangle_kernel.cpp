@@ -97,11 +97,12 @@ struct SmallTriangle {
     uint32_t low;
 };
 
+template <int kSamples>
 class Kernel {
 public:
     HWY_INLINE Kernel(const VisibilityTile& tile, const TriangleRun& run,
                       std::vector<uint32_t>& clipped)
-        : tile_(tile), run_(run), clipped_(clipped), offset_(sampleOffsets(tile.samples)) {}
+        : tile_(tile), run_(run), clipped_(clipped), offset_(sampleOffsets(kSamples)) {}
 
     /// Corners are copied side by side one group ahead, so that the stores have left the pipeline
     /// when they are read as vectors: faster than gathering.
@@ -157,7 +158,7 @@ private:
         const VU number = hn::Iota(du, run_.first_number + uint32_t(first));
         g.low = hn::BitCast(di, hn::Sub(hn::Set(du, lowerWord(0)), number));
         g.orient(run_.both_sides);
-        for (int sample = 0; sample < tile_.samples; ++sample) drawSample(g, sample);
+        for (int sample = 0; sample < kSamples; ++sample) drawSample(g, sample);
     }
 
     /// Conservative: some pixel of the tile may have a sample within the triangle's box.
@@ -278,7 +279,7 @@ private:
     }
 
     HWY_INLINE VisibilityKey* keyAt(ptrdiff_t pixel, int sample) const {
-        return tile_.key + pixel * tile_.samples + sample;
+        return tile_.key + pixel * kSamples + sample;
     }
 
     void drawRows(const Group& g, uint32_t bits, VI x0, VI x1, VI y0, VI y1, int sample) const {
@@ -355,7 +356,7 @@ private:
                 VisibilityKey* key = keyAt(ptrdiff_t(y) * tile_.width + x, sample);
                 for (; bits != 0; bits &= bits - 1) {
                     const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(bits);
-                    put(key + lane * size_t(tile_.samples), depth[lane], t.low);
+                    put(key + lane * size_t(kSamples), depth[lane], t.low);
                 }
             }
             for (int k = 0; k < 3; ++k) row[k] += step_y[k];
@@ -370,7 +371,10 @@ private:
 
 void DrawTriangles(const VisibilityTile& tile, const TriangleRun& run,
                    std::vector<uint32_t>& clipped) {
-    Kernel(tile, run, clipped).drawAll();
+    if (tile.samples == 1)
+        Kernel<1>(tile, run, clipped).drawAll();
+    else
+        Kernel<4>(tile, run, clipped).drawAll();
 }
 
 }  // namespace HWY_NAMESPACE
