@@ -15,7 +15,11 @@ constexpr uint64_t kUnknown = ~uint64_t(0);
 /// Open-addressed table from a vertex (position and attributes) to its number in the output.
 class BorderVertices {
 public:
-    explicit BorderVertices(Budget& budget) : budget_(budget) { grow(); }
+    explicit BorderVertices(Budget& budget) : budget_(budget) {
+        const size_t size = size_t(1) << 8;
+        reserved_ = budget_.reserve(size * sizeof(Slot), "a table of border vertices");
+        slots_.assign(size, Slot());
+    }
 
     bool wasDropped() const { return dropped_; }
 
@@ -35,26 +39,19 @@ public:
 
 private:
     struct Slot {
-        uint64_t position, attributes, number = kUnknown;
+        uint64_t position = 0, attributes = 0, number = kUnknown;
     };
-
-    void grow() {
-        const size_t size = std::max<size_t>(2 * slots_.size(), 1 << 12);
-        reserved_ = budget_.reserve(size * sizeof(Slot), "a table of border vertices");
-        slots_.assign(size, {0, 0, kUnknown});
-        used_ = 0;
-    }
 
     void makeRoom() {
         const size_t size = 2 * slots_.size();
         Reservation more = budget_.tryReserve(size * sizeof(Slot));
         if (more.bytes() == 0) {
             dropped_ = true;
-            std::fill(slots_.begin(), slots_.end(), Slot{0, 0, kUnknown});
+            std::fill(slots_.begin(), slots_.end(), Slot());
             used_ = 0;
             return;
         }
-        std::vector<Slot> old(size, Slot{0, 0, kUnknown});
+        std::vector<Slot> old(size, Slot());
         old.swap(slots_);
         used_ = 0;
         for (const Slot& slot : old)

@@ -14,6 +14,7 @@ std::unique_ptr<Verb> makeCheckVerb();
 std::unique_ptr<Verb> makeExtractVerb();
 std::unique_ptr<Verb> makeRenderVerb();
 std::unique_ptr<Verb> makeCompareVerb();
+std::unique_ptr<Verb> makeSynthVerb();
 
 using VerbTable = std::vector<std::unique_ptr<Verb>>;
 
