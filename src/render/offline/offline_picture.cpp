@@ -51,6 +51,23 @@ size_t drawnBytes(const Mesh& mesh) {
            mesh.vertexCount() * kScreenVertexBytes;
 }
 
+/// Greys from the nearest point of the picture (white) to its farthest.
+void paintDepth(Picture& picture) {
+    constexpr float kFarthest = 40, kNearest = 255;
+    float near = std::numeric_limits<float>::infinity(), far = 0;
+    for (const float depth : picture.depth)
+        if (std::isfinite(depth)) {
+            near = std::min(near, depth);
+            far = std::max(far, depth);
+        }
+    const float scale = far > near ? (kNearest - kFarthest) / (far - near) : 0;
+    for (size_t i = 0; i < picture.pixelCount(); ++i) {
+        if (!std::isfinite(picture.depth[i])) continue;
+        const auto grey = uint8_t(kNearest - (picture.depth[i] - near) * scale + 0.5f);
+        picture.colour[i] = {grey, grey, grey, 255};
+    }
+}
+
 class OfflineRenderer {
 public:
     OfflineRenderer(std::span<const ModelReader* const> models, const Camera& camera,
@@ -75,6 +92,7 @@ public:
                               settings_.shade);
         for (uint32_t m = 0; m < models_.size(); ++m) drawModel(m, rasteriser);
         result_.picture = rasteriser.finish();
+        if (settings_.shade.show == Show::kDepth) paintDepth(result_.picture);
         progress_.endStage();
         report(rasteriser.statistics());
         result_.statistics.total_ms = msSince(start);
