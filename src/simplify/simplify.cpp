@@ -126,6 +126,7 @@ struct Simplifier::State {
         return mesh.stamp[u] + mesh.stamp[v] == stamp;
     }
     void popCandidates(Candidates& batch);
+    void prefetchCandidates(const Candidates& batch);
     void collapseCandidates(Candidates& batch);
     void drainQueue();
     Candidates candidates;
@@ -188,6 +189,7 @@ void Simplifier::State::buildPositions() {
 void Simplifier::State::pushEdge(uint32_t u, uint32_t v) {
     pending.u[pending_count] = u;
     pending.v[pending_count] = v;
+    __builtin_prefetch(&mesh.quadric[v]);
     if (++pending_count == kBatch) flushPending();
 }
 
@@ -266,7 +268,28 @@ void Simplifier::State::popCandidates(Candidates& batch) {
         batch.edges.u[batch.count] = swap ? e.v : e.u;
         batch.edges.v[batch.count] = swap ? e.u : e.v;
         batch.stamp[batch.count++] = e.stamp;
+        __builtin_prefetch(&mesh.fan[e.u]);
+        __builtin_prefetch(&mesh.fan[e.v]);
+        __builtin_prefetch(&mesh.quadric[e.u]);
+        __builtin_prefetch(&mesh.quadric[e.v]);
     }
+}
+
+void Simplifier::State::prefetchCandidates(const Candidates& batch) {
+    const EdgeBatch& edges = batch.edges;
+    for (uint32_t i = 0; i < batch.count; ++i) {
+        __builtin_prefetch(&mesh.corner[mesh.fan[edges.u[i]].begin]);
+        __builtin_prefetch(&mesh.corner[mesh.fan[edges.v[i]].begin]);
+        __builtin_prefetch(&normal[edges.u[i]]);
+        __builtin_prefetch(&normal[edges.v[i]]);
+        positions.prefetch({edges.x[i], edges.y[i], edges.z[i]});
+    }
+    for (uint32_t i = 0; i < batch.count; ++i)
+        for (const uint32_t v : {edges.u[i], edges.v[i]}) {
+            const Fan& fan = mesh.fan[v];
+            for (uint32_t j = 0; j < fan.count; ++j)
+                __builtin_prefetch(&mesh.face[mesh.corner[fan.begin + j] >> 2]);
+        }
 }
 
 void Simplifier::State::collapseCandidates(Candidates& batch) {
@@ -276,6 +299,7 @@ void Simplifier::State::collapseCandidates(Candidates& batch) {
         edges.v[i] = edges.v[0];
     }
     kernels.place(mesh.point.data(), mesh.quadric.data(), grid, edges);
+    prefetchCandidates(batch);
     for (uint32_t i = 0; i < batch.count && mesh.cells_above > 0; ++i) {
         const uint32_t u = edges.u[i], v = edges.v[i];
         if (!stillThere(u, v, batch.stamp[i])) continue;
