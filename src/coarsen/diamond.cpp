@@ -14,7 +14,7 @@ constexpr uint32_t kNoVertex = ~0u;
 // roots.
 constexpr int kTopLevels = 6;
 constexpr uint32_t kSmallTopPatch = 250;
-constexpr uint32_t kSmallestPatch = 64;  // below this there is nothing to gain
+constexpr uint32_t kSmallestPatch = 128;  // below this there is nothing to gain
 
 void copyVertex(const Mesh& from, uint32_t v, int scalar_count, Mesh& to) {
     to.position.push_back(from.position[v]);

@@ -212,6 +212,11 @@ HWY_INLINE void placeLanes(const Point* points, const Quadric* quadrics, const S
     const auto rank_v = hn::And(hn::BitCast(di, at_v.c3), rank_mask);
     V3<V> to = select(hn::RebindMask(d, hn::Gt(rank_u, rank_v)), at_u.xyz(), snapped);
     to = select(hn::RebindMask(d, hn::Gt(rank_v, rank_u)), at_v.xyz(), to);
+    // A curve keeps vertices of its own: the end with the lower cost, v where f(edge) < f(0).
+    const auto curve = hn::Set(di, int32_t(kRankCurve));
+    const auto on_curve = hn::And(hn::Eq(rank_u, curve), hn::Eq(rank_v, curve));
+    const auto v_is_better = hn::Lt(dot(a.times(edge) + g + g, edge), hn::Zero(d));
+    to = select(hn::RebindMask(d, on_curve), select(v_is_better, at_v.xyz(), at_u.xyz()), to);
 
     const V3<V> z = to - at_u.xyz();
     const V cost = hn::Add(dot(a.times(z) + g + g, z), c);

@@ -42,67 +42,25 @@ bool hasArea(const WorkingMesh& mesh, const Face& face) {
     return p.y * q.z != p.z * q.y || p.z * q.x != p.x * q.z || p.x * q.y != p.y * q.x;
 }
 
-float areaOf(const WorkingMesh& mesh, const Face& face) {
-    const Vec3f a = mesh.point[face.v[0]].vec();
-    const Vec3f n = glm::cross(mesh.point[face.v[1]].vec() - a, mesh.point[face.v[2]].vec() - a);
-    return std::sqrt(glm::dot(n, n));
-}
-
-/// Union-find over the vertices, apart from WorkingMesh::parent.
-class Components {
+/// Union-find over the faces.
+class FaceSets {
 public:
-    explicit Components(const WorkingMesh& mesh) : parent_(mesh.point.size()) {
-        for (uint32_t v = 0; v < parent_.size(); ++v) parent_[v] = v;
-        for (const Face& face : mesh.face) {
-            if (face.dead()) continue;
-            unite(face.v[0], face.v[1]);
-            unite(face.v[0], face.v[2]);
-        }
+    explicit FaceSets(size_t count) : parent_(count) {
+        for (uint32_t f = 0; f < count; ++f) parent_[f] = f;
     }
-    uint32_t root(uint32_t v) {
-        while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
-        return v;
+    uint32_t root(uint32_t f) {
+        while (parent_[f] != f) f = parent_[f] = parent_[parent_[f]];
+        return f;
     }
-
-private:
     void unite(uint32_t a, uint32_t b) {
         a = root(a);
         b = root(b);
         if (a != b) parent_[std::max(a, b)] = std::min(a, b);
     }
+
+private:
     std::vector<uint32_t> parent_;
 };
-
-struct Component {
-    Box3f box;
-    float diagonal = 0;
-    bool outer = false;
-    std::vector<uint32_t> faces;
-};
-
-/// In the order of their first triangle.
-std::vector<Component> findComponents(const WorkingMesh& mesh) {
-    Components sets(mesh);
-    std::vector<uint32_t> index(mesh.point.size(), 0xffffffffu);
-    std::vector<Component> components;
-    for (uint32_t f = 0; f < mesh.face.size(); ++f) {
-        const Face& face = mesh.face[f];
-        if (face.dead()) continue;
-        uint32_t& i = index[sets.root(face.v[0])];
-        if (i == 0xffffffffu) {
-            i = uint32_t(components.size());
-            components.emplace_back();
-        }
-        Component& c = components[i];
-        c.faces.push_back(f);
-        for (const uint32_t v : face.v) {
-            c.box.add(mesh.point[v].vec());
-            c.outer |= mesh.point[v].outer();
-        }
-    }
-    for (Component& c : components) c.diagonal = c.box.diagonal();
-    return components;
-}
 
 }  // namespace
 
@@ -115,6 +73,42 @@ void Fallback::allowForLocks(WorkingMesh& mesh) {
     }
     mesh.cells_above = 0;
     for (uint32_t c = 0; c < mesh.cell_count.size(); ++c) mesh.cells_above += mesh.cellAbove(c);
+}
+
+void Fallback::relaxQuotas(WorkingMesh& mesh, float factor) {
+    mesh.cells_above = 0;
+    for (uint32_t c = 0; c < mesh.cell_count.size(); ++c) {
+        mesh.cell_quota[c] = uint32_t(factor * float(mesh.cell_quota[c]));
+        mesh.cells_above += mesh.cellAbove(c);
+    }
+}
+
+// Triangles hang together over edges, not over points: what only touches the rest can go without
+// opening anything. In the order of their first triangle.
+std::vector<Fallback::Component> Fallback::findComponents(const WorkingMesh& mesh) {
+    pinBorderTriangles(mesh);
+    FaceSets sets(mesh.face.size());
+    for (size_t i = 1; i < edges_.size(); ++i)
+        if (edges_[i].key == edges_[i - 1].key)
+            sets.unite(edges_[i].corner >> 2, edges_[i - 1].corner >> 2);
+    std::vector<uint32_t> index(mesh.face.size(), 0xffffffffu);
+    std::vector<Component> components;
+    std::vector<Box3f> boxes;
+    for (uint32_t f = 0; f < mesh.face.size(); ++f) {
+        const Face& face = mesh.face[f];
+        if (face.dead()) continue;
+        uint32_t& i = index[sets.root(f)];
+        if (i == 0xffffffffu) {
+            i = uint32_t(components.size());
+            components.emplace_back();
+            boxes.emplace_back();
+        }
+        components[i].faces.push_back(f);
+        components[i].outer |= pinned_face_[f] != 0;
+        for (const uint32_t v : face.v) boxes[i].add(mesh.point[v].vec());
+    }
+    for (size_t i = 0; i < components.size(); ++i) components[i].diagonal = boxes[i].diagonal();
+    return components;
 }
 
 uint32_t Fallback::dropComponents(WorkingMesh& mesh, float diameter) {
@@ -130,10 +124,7 @@ uint32_t Fallback::dropComponents(WorkingMesh& mesh, float diameter) {
             return mesh.cellAbove(mesh.face[f].cell());
         });
         if (c.outer || !wanted) continue;
-        for (const uint32_t f : c.faces) {
-            mesh.killFace(f);
-            for (const uint32_t v : mesh.face[f].v) mesh.point[v].flags |= kDeadFlag;
-        }
+        for (const uint32_t f : c.faces) mesh.killFace(f);
         dropped += uint32_t(c.faces.size());
     }
     return dropped;
@@ -162,6 +153,10 @@ void Fallback::pinBorderTriangles(const WorkingMesh& mesh) {
         for (end = i; end < edges_.size() && edges_[end].key == edges_[i].key; ++end)
             complete &= mesh.face[edges_[end].corner >> 2].edgeClass(edges_[end].corner & 3) == c;
         complete = complete && c != EdgeClass::kMany && end - i == usesOf(c);
+        // Ends of border and non-manifold edges stay where they are, and with them these edges.
+        if (c != EdgeClass::kManifold)
+            for (const uint32_t k : {edges_[i].corner & 3, kNextCorner[edges_[i].corner & 3]})
+                pinned_vertex_[mesh.face[edges_[i].corner >> 2].v[k]] = 1;
         if (complete) continue;
         shared_edges_.push_back(edges_[i].key);
         for (size_t j = i; j < end; ++j) {
@@ -217,7 +212,6 @@ bool Fallback::mergeBoxes(WorkingMesh& mesh, float spacing, uint32_t& merged) {
     if (!some_left) return false;
     merged += remapFaces(mesh);
     dropDoubles(mesh);
-    thinEdges(mesh);
     return true;
 }
 
@@ -255,12 +249,14 @@ uint32_t Fallback::remapFaces(WorkingMesh& mesh) {
         Face& face = mesh.face[f];
         if (face.dead()) continue;
         for (uint32_t& v : face.v) v = target_[v];
-        if (!pinned_face_[f] && !hasArea(mesh, face)) mesh.killFace(f);
+        const auto& v = face.v;
+        if (v[0] == v[1] || v[1] == v[2] || v[2] == v[0]) mesh.killFace(f);
     }
     return merged;
 }
 
-/// Of triangles with the same corners the first is kept, a pinned one before others.
+/// Triangles with the same corners go in pairs: an edge that was used an even number of times is so
+/// still, and no hole appears. A pinned one stays, whatever lies on it.
 void Fallback::dropDoubles(WorkingMesh& mesh) {
     struct Entry {
         std::array<uint32_t, 3> v;
@@ -279,40 +275,11 @@ void Fallback::dropDoubles(WorkingMesh& mesh) {
         if (pinned_face_[a.face] != pinned_face_[b.face]) return pinned_face_[a.face] != 0;
         return a.face < b.face;
     });
-    for (size_t i = 1; i < entries.size(); ++i)
-        if (entries[i].v == entries[i - 1].v) mesh.killFace(entries[i].face);
-}
-
-/// Leaves at most three triangles at each edge, the largest ones.
-void Fallback::thinEdges(WorkingMesh& mesh) {
-    collectEdges(mesh);
-    struct Candidate {
-        float area;
-        uint32_t face;
-    };
-    std::vector<Candidate> candidates;
-    std::vector<uint8_t> crowded(mesh.face.size(), 0);
-    for (size_t i = 0, end; i < edges_.size(); i = end) {
-        for (end = i; end < edges_.size() && edges_[end].key == edges_[i].key;) ++end;
-        for (size_t j = i; end - i > 3 && j < end; ++j) crowded[edges_[j].corner >> 2] = 1;
-    }
-    for (uint32_t f = 0; f < mesh.face.size(); ++f)
-        if (crowded[f] && !pinned_face_[f]) candidates.push_back({areaOf(mesh, mesh.face[f]), f});
-    std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-        return a.area != b.area ? a.area < b.area : a.face > b.face;
-    });
-    for (const Candidate& c : candidates) {
-        const Face& face = mesh.face[c.face];
-        bool too_many = false;
-        for (uint32_t k = 0; k < 3; ++k) {
-            const EdgeUse first{edgeKey(face.v[k], face.v[kNextCorner[k]]), 0};
-            uint32_t alive = 0;
-            for (auto e = std::lower_bound(edges_.begin(), edges_.end(), first);
-                 e != edges_.end() && e->key == first.key; ++e)
-                alive += !mesh.face[e->corner >> 2].dead();
-            too_many |= alive > 3;
-        }
-        if (too_many) mesh.killFace(c.face);
+    for (size_t i = 1; i < entries.size(); ++i) {
+        if (entries[i].v != entries[i - 1].v || pinned_face_[entries[i - 1].face]) continue;
+        mesh.killFace(entries[i - 1].face);
+        mesh.killFace(entries[i].face);
+        ++i;
     }
 }
 

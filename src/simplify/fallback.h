@@ -18,17 +18,20 @@ public:
     /// quotas.
     void allowForLocks(WorkingMesh& mesh);
 
-    /// Drops connected components without outer vertices and with a box diagonal below `diameter`,
-    /// smallest first, from cells above their quota; never the one of the largest diagonal. Returns
-    /// the number of triangles dropped.
+    /// Multiplies the quotas: what comes next is only for cells that are far above theirs.
+    void relaxQuotas(WorkingMesh& mesh, float factor);
+
+    /// Drops components, triangles that hang together over edges, that lie wholly in this mesh and
+    /// have a box diagonal below `diameter`, smallest first, from cells above their quota; never the
+    /// one of the largest diagonal. Returns the number of triangles dropped.
     uint32_t dropComponents(WorkingMesh& mesh, float diameter);
 
     /// Merges vertices of cells above their quota that lie in one box of a grid of spacing
     /// `spacing`, into one of them; repeats with a coarser grid until the quotas are met or one box
-    /// holds all. Degenerate and doubled triangles go; so do some where an edge would get more than
-    /// three: it would be locked ever after. Edge classes become the number of uses. Outer vertices
-    /// stay, and so do the triangles on the outer border. Returns the number of vertices merged;
-    /// `spacing` becomes that of the last grid.
+    /// holds all. Degenerate triangles go, and doubled ones in pairs, so that no edge is left with an
+    /// odd number of triangles: no hole appears, but sheets may grow together. Outer vertices, those
+    /// on borders and on non-manifold edges stay. Returns the number of vertices merged; `spacing`
+    /// becomes that of the last grid.
     uint32_t clusterVertices(WorkingMesh& mesh, float& spacing);
 
 private:
@@ -47,13 +50,19 @@ private:
         }
     };
 
+    struct Component {
+        float diagonal = 0;
+        bool outer = false;  ///< an edge of it is used elsewhere too
+        std::vector<uint32_t> faces;
+    };
+
+    std::vector<Component> findComponents(const WorkingMesh& mesh);
     void collectEdges(const WorkingMesh& mesh);
     void pinBorderTriangles(const WorkingMesh& mesh);
     bool mergeBoxes(WorkingMesh& mesh, float spacing, uint32_t& merged);
     void mergeMembers(const WorkingMesh& mesh, const Member* begin, const Member* end);
     uint32_t remapFaces(WorkingMesh& mesh);
     void dropDoubles(WorkingMesh& mesh);
-    void thinEdges(WorkingMesh& mesh);
     void classifyEdges(WorkingMesh& mesh);
 
     std::vector<EdgeUse> edges_;

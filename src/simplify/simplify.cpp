@@ -14,6 +14,11 @@
 #include "simplify/working_mesh.h"
 
 namespace pietra {
+
+// Where collapses are stuck: whole components go from cells this many times above their quota, and
+// vertices are clustered in cells this many times above.
+static constexpr float kDropAbove = 1.25f, kClusterAbove = 3;
+
 namespace {
 
 /// Border planes count as if the surface went on at a right angle for this many edge lengths.
@@ -328,6 +333,12 @@ void Simplifier::State::fallBack(float droppable_error, SimplifyOutput& output) 
     if (mesh.cells_above == 0) return;
     const float droppable = std::max(droppable_error, output.estimated_error);
     output.dropped_triangles = fallback.dropComponents(mesh, droppable);
+    if (mesh.cells_above == 0) return;
+    // Topology holds on to what is left. A little more than asked for is better than harm.
+    fallback.relaxQuotas(mesh, kDropAbove);
+    output.dropped_triangles += fallback.dropComponents(mesh, HUGE_VALF);
+    if (mesh.cells_above == 0) return;
+    fallback.relaxQuotas(mesh, kClusterAbove / kDropAbove);
     if (mesh.cells_above == 0) return;
     float spacing = droppable;
     output.clustered = fallback.clusterVertices(mesh, spacing);
