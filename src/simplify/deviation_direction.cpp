@@ -2,19 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 namespace pietra::deviation {
 
 namespace {
 
 /// Below this part of the children's error nothing is worth an effort.
-constexpr float kFloorPart = 0.5f;
+static float env(const char* n, float d) {
+    return getenv(n) ? float(atof(getenv(n))) : d;
+}
+const float kFloorPart = env("FLOOR", 0.2f);
 /// Accepted as it comes: this part of what was verified already.
-constexpr float kAcceptPart = 0.5f;
+const float kAcceptPart = env("ACC", 0.5f);
 /// Verified: whatever is above this part of the largest value verified.
-constexpr float kVerifyPart = 0.9f;
+const float kVerifyPart = env("RHO", 0.9f);
 /// A piece this much above the largest value verified is verified at once, not at the end.
 constexpr float kEagerFactor = 1.5f;
+/// Above this cosine of the normals the vertical distance is nearly the distance.
+constexpr float kVerticalIsTight = 0.95f;
 /// Lattice units: far below what rounding to the lattice costs.
 constexpr float kNegligible = 0x1p-4f;
 /// A value this close to its lower bound is good enough.
@@ -30,6 +36,7 @@ bool smaller(const Piece& a, const Piece& b) {
 
 }  // namespace
 
+static const float kH = env("HEIGHT", 0.4f);
 float Progressing::limit() const {
     return std::max({kFloorPart * floor, kAcceptPart * verified, kNegligible});
 }
@@ -67,40 +74,28 @@ void Direction::cover(uint32_t t, uint32_t start, Progressing& progress) {
 
 bool Direction::coverField(uint32_t t, uint32_t start, const Progressing& progress) {
     if (!field_.run(*source_, t, start)) return false;
-    const Vec3f origin = source_->corner(t, 0);
-    const float limit = progress.limit();
+    const float limit = progress.limit(), above = progress.verifyAbove();
+    const float b = base(t) + field_.slack();
     for (const FieldCover::Hit& hit : field_.hits()) {
         ++counters_.overlaps;
-        const float value =
-            (base(t) + offset(hit.face) + (hit.height + field_.slack())) * (1 + 0x1p-21f);
-        if (value <= limit) {
-            ++counters_.by_height;
+        const float value = (b + offset(hit.face) + hit.height) * (1 + 0x1p-21f);
+        if (value <= limit || (value <= above && hit.cosine > kVerticalIsTight)) {
+            ++counters_.by_overlap;
             accept(t, hit.face, value);
             continue;
         }
-        const float plane =
-            (base(t) + offset(hit.face) + (field_.overlapHeight(hit) + field_.slack())) *
-            (1 + 0x1p-21f);
-        if (plane <= limit) {
-            ++counters_.by_overlap;
-            accept(t, hit.face, plane);
-            continue;
-        }
-        Piece piece;
-        piece.source = t;
-        piece.target = hit.face;
-        if (!field_.overlap(hit, piece.polygon)) return false;
+        Piece piece{{}, t, hit.face, b, value};
+        if (!field_.overlap(hit.face, piece.polygon)) return false;
         if (piece.polygon.count < 3) continue;
-        piece.base = base(t) + field_.slack();
-        piece.value =
-            std::min(value, partition_.value(piece.polygon, origin, piece.base, hit.face));
+        const Vec3f origin = source_->corner(t, 0);
+        piece.value = std::min(value, partition_.value(piece.polygon, origin, b, hit.face));
         take(piece, progress);
     }
     return true;
 }
 
 void Direction::take(const Piece& piece, const Progressing& progress) {
-    if (piece.value <= progress.limit()) {
+    if (piece.value <= progress.verifyAbove()) {
         accept(piece.source, piece.target, piece.value);
     } else {
         ++counters_.pieces;
