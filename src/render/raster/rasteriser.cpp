@@ -22,7 +22,7 @@ namespace {
 /// A larger mesh is drawn in several chunks.
 constexpr size_t kChunkTriangles = 4096;
 /// More tiles than threads, so that none waits long for the last one.
-constexpr size_t kTilesPerThread = 4;
+constexpr size_t kTilesPerThread = 8;
 
 size_t threadCount() {
     return tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
