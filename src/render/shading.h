@@ -28,7 +28,7 @@ enum class Show {
 struct ShadeSettings {
     Show show = Show::kShaded;
     /// Towards the one light, in view space: right, up, towards the viewer. Any length but zero.
-    Vec3d light_direction{-0.45, 0.65, 0.6};
+    Vec3d light_direction{-0.6, 0.6, 0.53};
     /// Draw and light every patch from both sides, whatever its `one_sided` says.
     bool two_sided = false;
 
