@@ -1,6 +1,6 @@
 #pragma once
-// Parallel loops over oneTBB. Bodies must not depend on the order of execution; results that reach a
-// file are written in index order by the caller, so output is the same for any number of threads.
+// Parallel loops over oneTBB. Bodies must not depend on the order of execution; results that reach
+// a file are written in index order by the caller, so output is the same for any number of threads.
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/global_control.h>
@@ -25,25 +25,25 @@ private:
 /// body(i) for each i of [0, count), one task each: for coarse work.
 template <class Body>
 void parallelFor(size_t count, Body&& body) {
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, count, 1),
-                      [&](const tbb::blocked_range<size_t>& range) {
-                          for (size_t i = range.begin(); i < range.end(); ++i) body(i);
-                      },
-                      tbb::simple_partitioner());
+    tbb::parallel_for(
+        tbb::blocked_range<size_t>(0, count, 1),
+        [&](const tbb::blocked_range<size_t>& range) {
+            for (size_t i = range.begin(); i < range.end(); ++i) body(i);
+        },
+        tbb::simple_partitioner());
 }
 
 /// body(begin, end) over slices of [0, count) of about `grain` elements: for fine work.
 template <class Body>
 void parallelForSlices(size_t count, size_t grain, Body&& body) {
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, count, grain),
-                      [&](const tbb::blocked_range<size_t>& range) {
-                          body(range.begin(), range.end());
-                      },
-                      tbb::simple_partitioner());
+    tbb::parallel_for(
+        tbb::blocked_range<size_t>(0, count, grain),
+        [&](const tbb::blocked_range<size_t>& range) { body(range.begin(), range.end()); },
+        tbb::simple_partitioner());
 }
 
-/// produce(i) in parallel for i of [0, count); consume(result) for one at a time, in the order of i. At
-/// most `in_flight` results exist at a time.
+/// produce(i) in parallel for i of [0, count); consume(result) for one at a time, in the order of
+/// i. At most `in_flight` results exist at a time.
 template <class Produce, class Consume>
 void orderedPipeline(size_t count, size_t in_flight, Produce&& produce, Consume&& consume) {
     using Result = decltype(produce(size_t(0)));

@@ -13,8 +13,8 @@ namespace {
 struct BlobHeader {
     uint32_t vertices;
     uint32_t triangles;
-    uint8_t has_classes;     // else all are zero
-    uint8_t has_bounds;      // else all are `bound`
+    uint8_t has_classes;  // else all are zero
+    uint8_t has_bounds;   // else all are `bound`
     uint8_t has_colours;
     uint8_t pad = 0;
     float bound;
@@ -137,8 +137,10 @@ void CellStore::get(const CellBlob& blob, CellMesh& cell) const {
     } else {
         unpack.get(mesh.triangle.data(), header.triangles);
     }
-    if (header.has_classes) unpack.get(mesh.edge_class, header.triangles);
-    else mesh.edge_class.assign(header.triangles, 0);
+    if (header.has_classes)
+        unpack.get(mesh.edge_class, header.triangles);
+    else
+        mesh.edge_class.assign(header.triangles, 0);
 }
 
 }  // namespace pietra

@@ -7,7 +7,7 @@ namespace pietra::deviation {
 
 namespace {
 
-constexpr uint32_t kBlockFaces = 16;
+constexpr uint32_t kBlockFaces = 8;
 
 float squaredDistanceToBox(const Vec3f& p, const Vec3f& min, const Vec3f& max) {
     const Vec3f outside = glm::max(glm::max(min - p, p - max), Vec3f(0));
@@ -17,53 +17,50 @@ float squaredDistanceToBox(const Vec3f& p, const Vec3f& min, const Vec3f& max) {
 }  // namespace
 
 void Surface::assign(const Mesh& mesh) {
-    mesh_ = &mesh;
     blocks_valid_ = false;
+    vertex_.resize(mesh.position.size());
+    for (size_t v = 0; v < vertex_.size(); ++v) {
+        const Vec3f p(mesh.position[v]);
+        vertex_[v].xyz0 = {p.x, p.y, p.z, 0};
+    }
     face_.resize(mesh.triangle.size());
     face_at_.assign(mesh.position.size(), kNone);
     for (uint32_t f = 0; f < face_.size(); ++f) {
         face_[f].vertex = mesh.triangle[f];
-        face_[f].opposite = {kNone, kNone, kNone};
+        face_[f].opposite = {};
         for (const uint32_t v : mesh.triangle[f]) face_at_[v] = f;
     }
     linkNeighbours();
     computeNormals();
 }
 
-// Half-edges are listed by their lower vertex; a second one with the same upper vertex is the
-// opposite. A third marks all of them as having none.
+// Half-edges are listed by their lower vertex; the first of each pair of vertices stands for all. A
+// second one is its opposite if it runs the other way; whatever comes later undoes the pair.
 void Surface::linkNeighbours() {
-    first_at_vertex_.assign(vertexCount(), kNone);
-    next_half_edge_.resize(3 * size_t(faceCount()));
+    first_link_.assign(vertexCount(), kNone);
+    link_.resize(3 * size_t(faceCount()));
+    uint32_t used = 0;
     for (uint32_t f = 0; f < faceCount(); ++f) {
-        for (int k = 0; k < 3; ++k) {
-            const uint32_t a = face_[f].vertex[k], b = face_[f].vertex[(k + 1) % 3];
+        for (uint32_t k = 0; k < 3; ++k) {
+            const uint32_t a = face_[f].vertex[k], b = face_[f].vertex[nextCorner(k)];
             const uint32_t low = std::min(a, b), high = std::max(a, b);
-            const uint32_t half_edge = 3 * f + k;
-            uint32_t twin = first_at_vertex_[low];
-            const auto upper = [&](uint32_t h) {
-                const Face& other = face_[h / 3];
-                return std::max(other.vertex[h % 3], other.vertex[(h % 3 + 1) % 3]);
-            };
-            bool many = false;
-            uint32_t found = kNone;
-            for (; twin != kNone; twin = next_half_edge_[twin]) {
-                if (upper(twin) != high) continue;
-                many = found != kNone;
-                found = twin;
-                const uint32_t partner = face_[twin / 3].opposite[twin % 3];
-                if (partner != kNone || many) {
-                    many = true;
-                    if (partner != kNone) face_[partner / 3].opposite[partner % 3] = kNone;
-                    face_[twin / 3].opposite[twin % 3] = kNone;
-                }
+            uint32_t i = first_link_[low];
+            while (i != kNone && link_[i].upper != high) i = link_[i].next;
+            if (i == kNone) {
+                link_[used] = {high, HalfEdge(f, k), first_link_[low], a < b, false};
+                first_link_[low] = used++;
+                continue;
             }
-            if (found != kNone && !many) {
-                face_[f].opposite[k] = found;
-                face_[found / 3].opposite[found % 3] = half_edge;
+            Link& link = link_[i];
+            HalfEdge& other = face_[link.half_edge.face()].opposite[link.half_edge.edge()];
+            if (link.taken) {
+                if (other.exists()) face_[other.face()].opposite[other.edge()] = {};
+                other = {};
+            } else if (link.ascending != (a < b)) {
+                other = HalfEdge(f, k);
+                face_[f].opposite[k] = link.half_edge;
             }
-            next_half_edge_[half_edge] = first_at_vertex_[low];
-            first_at_vertex_[low] = half_edge;
+            link.taken = true;
         }
     }
 }
@@ -75,45 +72,66 @@ void Surface::computeNormals() {
         const Vec3d n =
             glm::cross(Vec3d(position(face.vertex[1])) - a, Vec3d(position(face.vertex[2])) - a);
         const double length_sq = glm::dot(n, n);
-        face.normal = length_sq > 0 ? Vec3f(n / std::sqrt(length_sq)) : Vec3f(0);
+        const double inverse = length_sq > 0 ? 1 / std::sqrt(length_sq) : 0;
+        face.normal = Vec3f(n * inverse);
+        face.inverse_area = float(inverse);
     }
 }
 
 void Surface::buildBlocks() const {
     if (blocks_valid_) return;
     blocks_valid_ = true;
-    block_.clear();
-    for (uint32_t begin = 0; begin < faceCount(); begin += kBlockFaces) {
-        const uint32_t end = std::min(begin + kBlockFaces, faceCount());
-        Block block{Vec3f(std::numeric_limits<float>::max()),
-                    Vec3f(std::numeric_limits<float>::lowest())};
-        for (uint32_t f = begin; f < end; ++f) {
-            for (int k = 0; k < 3; ++k) {
-                block.min = glm::min(block.min, Vec3f(corner(f, k)));
-                block.max = glm::max(block.max, Vec3f(corner(f, k)));
-            }
+    constexpr Block kEmpty{Vec3f(std::numeric_limits<float>::max()),
+                           Vec3f(std::numeric_limits<float>::lowest())};
+    const auto blocksOf = [](size_t count) { return (count + kBlockFaces - 1) / kBlockFaces; };
+    size_t levels = 0;
+    for (size_t count = blocksOf(faceCount());; count = blocksOf(count)) {
+        if (blocks_.size() == levels) blocks_.emplace_back();
+        blocks_[levels].assign(count, kEmpty);
+        ++levels;
+        if (count <= kBlockFaces) break;
+    }
+    blocks_.resize(levels);
+    for (uint32_t f = 0; f < faceCount(); ++f) {
+        Block& block = blocks_[0][f / kBlockFaces];
+        for (int k = 0; k < 3; ++k) {
+            block.min = glm::min(block.min, corner(f, k));
+            block.max = glm::max(block.max, corner(f, k));
         }
-        block_.push_back(block);
+    }
+    for (size_t level = 1; level < levels; ++level) {
+        for (size_t b = 0; b < blocks_[level - 1].size(); ++b) {
+            Block& block = blocks_[level][b / kBlockFaces];
+            block.min = glm::min(block.min, blocks_[level - 1][b].min);
+            block.max = glm::max(block.max, blocks_[level - 1][b].max);
+        }
     }
 }
 
-Surface::Nearest Surface::nearest(const Vec3i& origin, const Vec3f& p,
-                                  std::span<const float> offset, Nearest best) const {
-    buildBlocks();
-    const Vec3f shift(origin);  // exact: lattice coordinates fit a float
-    for (uint32_t b = 0; b < block_.size(); ++b) {
-        const Block& block = block_[b];
-        if (squaredDistanceToBox(p, block.min - shift, block.max - shift) >=
-            best.value * best.value) {
+void Surface::searchBlock(size_t level, uint32_t block, const Vec3f& origin, const Vec3f& p,
+                          std::span<const float> offset, Nearest& best) const {
+    const Block& box = blocks_[level][block];
+    if (squaredDistanceToBox(p, box.min - origin, box.max - origin) >= best.value * best.value) {
+        return;
+    }
+    const uint32_t below = level > 0 ? uint32_t(blocks_[level - 1].size()) : faceCount();
+    const uint32_t end = std::min((block + 1) * kBlockFaces, below);
+    for (uint32_t i = block * kBlockFaces; i < end; ++i) {
+        if (level > 0) {
+            searchBlock(level - 1, i, origin, p, offset, best);
             continue;
         }
-        const uint32_t end = std::min((b + 1) * kBlockFaces, faceCount());
-        for (uint32_t f = b * kBlockFaces; f < end; ++f) {
-            const float value = std::sqrt(squaredDistance(p, local(f, origin))) +
-                                (offset.empty() ? 0.0f : offset[f]);
-            if (value < best.value) best = {f, value};
-        }
+        const float value = std::sqrt(squaredDistance(p, local(i, origin))) +
+                            (offset.empty() ? 0.0f : offset[i]);
+        if (value < best.value) best = {i, value};
     }
+}
+
+Surface::Nearest Surface::nearest(const Vec3f& origin, const Vec3f& p,
+                                  std::span<const float> offset, Nearest best) const {
+    buildBlocks();
+    const size_t top = blocks_.size() - 1;
+    for (uint32_t b = 0; b < blocks_[top].size(); ++b) searchBlock(top, b, origin, p, offset, best);
     return best;
 }
 

@@ -42,7 +42,7 @@ public:
     virtual VerbText text() const = 0;
     /// Called once, before parsing; targets are members of the verb.
     virtual void declare(OptionSet& options) = 0;
-    /// Returns the exit code: 0, or 6 where a check found a fault. Everything else is thrown.
+    /// Returns the exit code: 0, or what a check found (3: damaged, 6: faulty); all else is thrown.
     virtual int run(const RunContext& context) = 0;
 };
 
