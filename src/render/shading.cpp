@@ -149,11 +149,20 @@ Vec3f patchColour(const ShadeSettings& settings, const DrawPatch& patch) {
     }
 }
 
-Vec3f backgroundColour(const ShadeSettings& settings, int y, int height) {
+std::array<Rgba8, 4> backgroundRow(const ShadeSettings& settings, int y, int height) {
+    static constexpr int kBayer[4][4] = {
+        {0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
     const float t = height > 1 ? float(y) / float(height - 1) : 0;
-    const Vec3f top = linearFromSrgb(settings.background_top);
-    const Vec3f bottom = linearFromSrgb(settings.background_bottom);
-    return top * (1 - t) + bottom * t;
+    std::array<Rgba8, 4> row;
+    for (int x = 0; x < 4; ++x) {
+        const float threshold = (float(kBayer[y & 3][x]) + 0.5f) / 16;
+        const auto mix = [&](uint8_t top, uint8_t bottom) {
+            return uint8_t(float(top) * (1 - t) + float(bottom) * t + threshold);
+        };
+        const Rgba8 &top = settings.background_top, &bottom = settings.background_bottom;
+        row[size_t(x)] = {mix(top.r, bottom.r), mix(top.g, bottom.g), mix(top.b, bottom.b), 255};
+    }
+    return row;
 }
 
 }  // namespace pietra

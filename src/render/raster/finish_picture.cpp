@@ -1,6 +1,7 @@
 #include "render/raster/finish_picture.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <bit>
 #include <limits>
@@ -35,6 +36,8 @@ private:
     const uint8_t* srgb_ = srgbTable();
 };
 
+using Background = std::array<Rgba8, 4>;
+
 struct Row {
     VisibilityKey* key;
     const Rgba8* sample_colour;
@@ -44,32 +47,32 @@ struct Row {
 };
 
 /// These return how many pixels are covered.
-uint64_t finishRowOfOne(const Row& row, const Rgba8& background) {
+uint64_t finishRowOfOne(const Row& row, const Background& background) {
     uint64_t covered = 0;
     for (size_t x = 0; x < row.width; ++x) {
         const VisibilityKey key = row.key[x];
         const bool empty = key == 0;
         row.depth[x] = empty ? kNothing : depthOf(key);
-        row.colour[x] = empty ? background : row.colour[x];
+        row.colour[x] = empty ? background[x & 3] : row.colour[x];
         row.key[x] = 0;
         covered += !empty;
     }
     return covered;
 }
 
-uint64_t finishRowOfFour(const Row& row, const Rgba8& background, const Averager& averager) {
+uint64_t finishRowOfFour(const Row& row, const Background& background, const Averager& averager) {
     uint64_t covered = 0;
     for (size_t x = 0; x < row.width; ++x) {
         VisibilityKey* key = row.key + 4 * x;
         const VisibilityKey nearest = std::max({key[0], key[1], key[2], key[3]});
         if (nearest == 0) {
             row.depth[x] = kNothing;
-            row.colour[x] = background;
+            row.colour[x] = background[x & 3];
             continue;
         }
         Rgba8 colour[4];
         for (size_t s = 0; s < 4; ++s)
-            colour[s] = key[s] == 0 ? background : row.sample_colour[4 * x + s];
+            colour[s] = key[s] == 0 ? background[x & 3] : row.sample_colour[4 * x + s];
         row.depth[x] = depthOf(nearest);
         row.colour[x] = averager.average(colour);
         std::fill_n(key, 4, VisibilityKey(0));
@@ -106,8 +109,7 @@ uint64_t finishPicture(const ShadeSettings& settings, int samples, std::vector<V
         uint64_t count = 0;
         for (size_t y = begin; y < end; ++y) {
             const size_t first = y * width;
-            const Rgba8 background =
-                srgbFromLinear(backgroundColour(settings, int(y), picture.size.height));
+            const Background background = backgroundRow(settings, int(y), picture.size.height);
             const Row row{key.data() + first * size_t(samples),
                           samples == 1 ? nullptr : sample_colour.data() + 4 * first,
                           picture.colour.data() + first, picture.depth.data() + first, width};

@@ -38,6 +38,11 @@ void PixelShader::giveWeights(const BatchPatch& patch, const ShadeItem& item, si
     for (int k = 0; k < 3; ++k) lanes.given_weight[k][lane] = float(weight[k] / sum);
 }
 
+void PixelShader::prepare(const BatchPatch& patch, ShadeLanes& lanes) const {
+    lanes.both_sides = patch.both_sides;
+    for (int c = 0; c < 3; ++c) std::fill_n(lanes.base[c], kShadeLanes, patch.colour[c]);
+}
+
 void PixelShader::gather(const BatchPatch& patch, std::span<const ShadeItem> items,
                          ShadeLanes& lanes) const {
     const Triangle* triangle = patch.triangle();
@@ -48,7 +53,6 @@ void PixelShader::gather(const BatchPatch& patch, std::span<const ShadeItem> ite
         for (int k = 0; k < 3; ++k) lanes.corner[k][i] = patch.vertex[index[k]];
         lanes.place[i] = int32_t(item.place);
     }
-    lanes.both_sides = patch.both_sides;
     lanes.any_given = false;
     if (patch.whole) return;
     for (size_t i = 0; i < size_t(kShadeLanes); ++i) {
@@ -95,9 +99,7 @@ Vec3f PixelShader::baseColour(const BatchPatch& patch, uint32_t triangle,
 void PixelShader::compute(const BatchPatch& patch, std::span<const ShadeItem> items,
                           ShadeLanes& lanes) const {
     interpolateLanes(view_, lanes);
-    if (baseIsPatchColour(patch)) {
-        for (int c = 0; c < 3; ++c) std::fill_n(lanes.base[c], kShadeLanes, patch.colour[c]);
-    } else {
+    if (!baseIsPatchColour(patch)) {
         for (size_t i = 0; i < size_t(kShadeLanes); ++i) {
             const uint32_t triangle = items[std::min(i, items.size() - 1)].triangle;
             const Vec3f base = baseColour(

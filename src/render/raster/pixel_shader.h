@@ -40,6 +40,7 @@ public:
         // loads them.
         ShadeLanes lanes[2];
         if (items.empty()) return;
+        for (ShadeLanes& l : lanes) prepare(patch, l);
         gather(patch, items, lanes[0]);
         for (size_t done = 0, turn = 0; done < items.size(); done += kShadeLanes, turn ^= 1) {
             if (done + kShadeLanes < items.size())
@@ -51,6 +52,8 @@ public:
     }
 
 private:
+    /// What is the same for all items of a patch.
+    void prepare(const BatchPatch& patch, ShadeLanes& lanes) const;
     /// The first kShadeLanes of `items`, or less, the last one then taken for those that lack.
     void gather(const BatchPatch& patch, std::span<const ShadeItem> items, ShadeLanes& lanes) const;
     void compute(const BatchPatch& patch, std::span<const ShadeItem> items,

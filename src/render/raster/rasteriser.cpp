@@ -22,7 +22,7 @@ namespace {
 /// A larger mesh is drawn in several chunks.
 constexpr size_t kChunkTriangles = 4096;
 /// More tiles than threads, so that none waits long for the last one.
-constexpr size_t kTilesPerThread = 4;
+constexpr size_t kTilesPerThread = 8;
 
 size_t threadCount() {
     return tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
@@ -49,7 +49,7 @@ struct Rasteriser::State {
     ShadeSettings settings;
     int samples;
     std::vector<VisibilityKey> key;
-    bool key_clean = false;            // all zero
+    bool finished = false;             // the keys are then all zero again
     std::vector<Rgba8> sample_colour;  // with 4 samples; with 1 it is the picture's
     Picture picture;
     Batch batch;
@@ -77,8 +77,8 @@ void Rasteriser::State::begin() {
     picture.colour.resize(pixels);
     picture.depth.resize(pixels);
     const size_t keys = pixels * size_t(samples);
-    if (key.size() != keys || !key_clean) key.assign(keys, 0);
-    key_clean = false;
+    if (key.size() != keys || !finished) key.assign(keys, 0);
+    finished = false;
     if (samples > 1) sample_colour.resize(pixels * size_t(samples));
     statistics = {};
 }
@@ -223,6 +223,7 @@ void Rasteriser::setModel(const View& view, const Lattice& lattice) {
 
 void Rasteriser::draw(std::span<const DrawPatch> patches) {
     State& s = *state_;
+    CHECK(!s.finished);
     Stopwatch watch;
     s.layOut(patches);
     parallelFor(s.batch.patch.size(), [&](size_t i) { s.transform(s.batch.patch[i]); });
@@ -233,11 +234,12 @@ void Rasteriser::draw(std::span<const DrawPatch> patches) {
 
 const Picture& Rasteriser::finish() {
     State& s = *state_;
+    if (s.finished) return s.picture;
     Stopwatch watch;
     s.statistics.pixels_covered =
         finishPicture(s.settings, s.samples, s.key, s.sample_colour, s.picture);
     s.statistics.finish_ms += watch.ms();
-    s.key_clean = true;
+    s.finished = true;
     return s.picture;
 }
 

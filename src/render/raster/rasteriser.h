@@ -58,7 +58,7 @@ public:
     void setModel(const View& view, const Lattice& lattice);
     /// Draws, and shades what is visible so far: the meshes may vanish afterwards.
     void draw(std::span<const DrawPatch> patches);
-    /// Completes the picture; valid until restart(). draw() must not be called in between.
+    /// Completes the picture, which is valid until restart(); nothing can be drawn in between.
     const Picture& finish();
 
     const RasterStatistics& statistics() const;

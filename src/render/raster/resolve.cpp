@@ -29,15 +29,12 @@ public:
         : patch_(patch), shader_(shader), tile_(tile), colour_(colour) {}
     ~Collector() { flush(true); }
 
-    /// Makes room for `count` items; add() without room is undefined.
-    void reserve(size_t count) {
+    /// Where to put up to `count` more items; taken() then says up to where there are some.
+    ShadeItem* room(size_t count) {
         if (count_ + count > kCapacity) flush(false);
+        return item_ + count_;
     }
-    /// The item counts only if `keep`: without a branch, as it is anyone's guess.
-    void add(const ShadeItem& item, bool keep) {
-        item_[count_] = item;
-        count_ += keep;
-    }
+    void taken(const ShadeItem* end) { count_ = size_t(end - item_); }
 
 private:
     static constexpr size_t kCapacity = 512;
@@ -75,14 +72,17 @@ void collectOne(const VisibilityTile& tile, const DrawChunk& chunk, Collector& c
                 int32_t x0, int32_t x1) {
     const KeyRange range(chunk);
     const size_t row = size_t(y) * size_t(tile.width);
-    collector.reserve(kRun);
+    ShadeItem* item = collector.room(kRun);
     for (int32_t x = x0; x < x1; ++x) {
         const size_t pixel = row + size_t(x);
         const VisibilityKey key = tile.key[pixel];
         const bool mine = range.holds(key);
-        collector.add(ShadeItem::at(range.triangle(key, chunk), x, y, 1), mine);
+        // Counts only if it is the chunk's: without a branch, as that is anyone's guess.
+        *item = ShadeItem::at(range.triangle(key, chunk), x, y, 1);
+        item += mine;
         tile.key[pixel] = mine ? key | kResolved : key;
     }
+    collector.taken(item);
 }
 
 /// Each triangle once a pixel, with the mask of its samples.
@@ -90,7 +90,7 @@ void collectFour(const VisibilityTile& tile, const DrawChunk& chunk, Collector& 
                  int32_t y, int32_t x0, int32_t x1) {
     const KeyRange range(chunk);
     const size_t row = size_t(y) * size_t(tile.width);
-    collector.reserve(4 * kRun);
+    ShadeItem* item = collector.room(4 * kRun);
     for (int32_t x = x0; x < x1; ++x) {
         const size_t pixel = row + size_t(x);
         VisibilityKey* key = tile.key + 4 * pixel;
@@ -102,11 +102,13 @@ void collectFour(const VisibilityTile& tile, const DrawChunk& chunk, Collector& 
             for (int t = s; t < 4; ++t) mask |= uint32_t(uint32_t(key[t]) == uint32_t(key[s])) << t;
             mask &= left;
             const bool first = mask >> s & 1;
-            collector.add(ShadeItem::at(range.triangle(key[s], chunk), x, y, mask), first);
+            *item = ShadeItem::at(range.triangle(key[s], chunk), x, y, mask);
+            item += first;
             if (first) left &= ~mask;
         }
         for (int s = 0; s < 4; ++s) key[s] = range.holds(key[s]) ? key[s] | kResolved : key[s];
     }
+    collector.taken(item);
 }
 
 }  // namespace
