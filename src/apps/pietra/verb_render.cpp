@@ -128,7 +128,17 @@ VerbText RenderVerb::text() const {
              {"which level of detail is drawn where",
               "pietra render statue.pietra -o lod.png --view iso --show lod"},
              {"the full mesh from a given camera",
-              "pietra render statue.pietra -o full.png --camera c.json --pixels 0"}}};
+              "pietra render statue.pietra -o full.png --camera c.json --pixels 0"}},
+            "What --show may show",
+            {{"shaded", "the surface, lit, in its own colours where it has any"},
+             {"normals", "the normal in view space, as red, green and blue"},
+             {"depth", "near is light"},
+             {"lod", "the level of detail"},
+             {"patches", "the pieces that are loaded and drawn as one"},
+             {"triangles", "each triangle in a colour of its own"},
+             {"error", "the stated error, blue for none, red for the largest drawn"},
+             {"colour", "the model's own colours, unlit"},
+             {"scalar:NAME", "a scalar attribute of the model, in a colour map"}}};
 }
 
 void RenderVerb::declare(OptionSet& options) {
@@ -138,9 +148,7 @@ void RenderVerb::declare(OptionSet& options) {
     camera_.declare(options);
     options.number("--pixels", "T", pixels_, {.min = 0},
                    "Tolerance in pixels; 0 draws the full mesh.");
-    options.custom("--show", "WHAT", "shaded",
-                   "What the colours mean: shaded, normals, depth, lod (level of detail), patches, "
-                   "triangles, error (the stated one), colour, or scalar:NAME.",
+    options.custom("--show", "WHAT", "shaded", "What the colours mean, see below.",
                    [this](const std::string& word) { parseShow(word); });
     options.custom("--range", "MIN:MAX", "those of the coarsest cut",
                    "Values at the two ends of the colours of --show scalar:NAME.",

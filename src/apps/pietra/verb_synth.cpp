@@ -27,20 +27,21 @@ private:
 };
 
 VerbText SynthVerb::text() const {
-    std::string kinds = "Kinds:";
-    for (const SynthKind& kind : synthKinds())
-        kinds += fmt::format("{} {} ({})", kinds.back() == ':' ? "" : ";", kind.name, kind.about);
+    std::vector<std::pair<std::string, std::string>> kinds;
+    for (const SynthKind& kind : synthKinds()) kinds.emplace_back(kind.name, kind.about);
     return {
         "synth",
         "make a mesh of any size, for trying things out",
         {"KIND -o OUT.ply [--triangles N] [--seed S]",
          "subdivide IN -o OUT.ply [--levels N] [--displace A] [--seed S]"},
         {"Writes a mesh that is a function of its kind, its size and the seed alone. Memory does "
-         "not grow with the size.",
-         kinds + ".", "The ending of the name decides the format: .ply, .obj, .stl or .glb."},
+         "not grow with the size. The ending of the name decides the format: .ply, .obj, .stl or "
+         ".glb."},
         {{"a statue of ten million triangles", "pietra synth statue -o big.ply --triangles 10M"},
          {"a scan, made 256 times larger with detail of its own",
-          "pietra synth subdivide scan.ply -o huge.ply --levels 4 --displace 0.2"}}};
+          "pietra synth subdivide scan.ply -o huge.ply --levels 4 --displace 0.2"}},
+        "Kinds",
+        kinds};
 }
 
 void SynthVerb::declare(OptionSet& options) {
