@@ -8,7 +8,6 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
-#include "geometry/bounds.h"
 #include "geometry/lattice.h"
 
 namespace pietra {
@@ -33,11 +32,14 @@ uint64_t mortonCode(const Vec3d& p) {
     return bits(p.x) | bits(p.y) << 1 | bits(p.z) << 2;
 }
 
-float roundDown(double x) {
-    return std::nextafter(float(x), -kInfinity);
-}
+/// Outward by at least the rounding of the conversion; cheaper than the next float.
 float roundUp(double x) {
-    return std::nextafter(float(x), kInfinity);
+    const auto f = float(x);
+    return f + (std::abs(f) * 0x1p-22f + 1e-30f);
+}
+
+float roundDown(double x) {
+    return -roundUp(-x);
 }
 
 /// A difference of two floats is off by 2^-24 of itself, a sum of squares by little more.
@@ -57,34 +59,47 @@ float square(float x) {
 
 }  // namespace
 
-struct SampleIndex::Query {
-    float min[3], max[3];
-    Box3d box;
-    const TriangleCorners* corners;
-    std::optional<TriangleDistance> triangle;  // prepared when first needed
-    double reach;
-    float reach_up;
-    uint32_t tag;
+/// A box in floats, rounded outward; starts empty.
+struct SampleIndex::QueryBox {
+    float min[3] = {kInfinity, kInfinity, kInfinity};
+    float max[3] = {-kInfinity, -kInfinity, -kInfinity};
 
-    Query(const TriangleCorners& t, double triangle_reach, uint32_t triangle_tag)
-        : corners(&t), reach(triangle_reach), reach_up(roundUp(triangle_reach)), tag(triangle_tag) {
-        for (const Vec3d& corner : t) box.add(corner);
+    void add(const QueryBox& other) {
         for (int axis = 0; axis < 3; ++axis) {
-            min[axis] = roundDown(box.min[axis]);
-            max[axis] = roundUp(box.max[axis]);
+            min[axis] = std::min(min[axis], other.min[axis]);
+            max[axis] = std::max(max[axis], other.max[axis]);
         }
     }
+};
 
-    /// A lower bound of the squared distance of the box to a point.
-    double boxDistanceSq(const Vec3d& p) const {
-        const Vec3d gap = glm::max(glm::max(box.min - p, p - box.max), Vec3d(0));
-        return glm::dot(gap, gap) * (1 - 1e-12);
+struct SampleIndex::Query {
+    const TriangleCorners* corners;
+    QueryBox box;
+    std::optional<TriangleDistance> triangle;  // prepared when first needed
+
+    explicit Query(const TriangleCorners& t) : corners(&t) {
+        const Vec3d low = glm::min(glm::min(t[0], t[1]), t[2]);
+        const Vec3d high = glm::max(glm::max(t[0], t[1]), t[2]);
+        for (int axis = 0; axis < 3; ++axis) {
+            box.min[axis] = roundDown(low[axis]);
+            box.max[axis] = roundUp(high[axis]);
+        }
     }
 
     double distance(const Vec3d& p) {
         if (!triangle) triangle.emplace(*corners);
         return triangle->distance(p);
     }
+};
+
+/// What is common to the triangles of one call, and scratch.
+struct SampleIndex::Pass {
+    double reach;
+    float reach_up;
+    uint32_t tag;
+    std::vector<Query> queries;
+    std::vector<uint32_t> leaves;  // octets of samples that the run at hand concerns
+    size_t max_leaves;
 };
 
 SampleIndex::~SampleIndex() = default;
@@ -108,120 +123,158 @@ SampleIndex::SampleIndex(std::vector<Sample> samples, Budget& budget)
 }
 
 void SampleIndex::buildTree() {
-    for (size_t children = samples_.size(); children > 0;) {
-        const size_t nodes = (children + kWidth - 1) / kWidth;
-        const size_t depth = levels_.size();
-        std::vector<Octet> level((nodes + kWidth - 1) / kWidth);
+    for (size_t members = samples_.size(); members > 0;) {
+        const size_t octets = (members + kWidth - 1) / kWidth;
+        std::vector<Octet> level(octets);
         for (Octet& octet : level)
             for (int axis = 0; axis < 3; ++axis) {
-                // Absent siblings are infinitely far away.
+                // Absent members are infinitely far away.
                 std::fill_n(octet.min[axis], kWidth, kInfinity);
                 std::fill_n(octet.max[axis], kWidth, -kInfinity);
             }
-        for (size_t child = 0; child < children; ++child)
-            addBox(depth, child, level[child / kWidth / kWidth], child / kWidth % kWidth);
+        for (size_t m = 0; m < members; ++m) setBox(level[m / kWidth], m);
         levels_.push_back(std::move(level));
-        children = nodes == 1 ? 0 : nodes;
+        members = octets == 1 ? 0 : octets;
     }
 }
 
-/// Enlarges box k of the octet, on level `depth`, by that of a child: a sample or a node below.
-void SampleIndex::addBox(size_t depth, size_t child, Octet& octet, size_t k) const {
+/// Sets the box of member m of the level to be pushed: a sample, or an octet of the level below.
+void SampleIndex::setBox(Octet& octet, size_t m) const {
     for (int axis = 0; axis < 3; ++axis) {
-        float low, high;
-        if (depth == 0) {
-            low = roundDown(samples_[child].position[axis]);
-            high = roundUp(samples_[child].position[axis]);
+        float& low = octet.min[axis][m % kWidth];
+        float& high = octet.max[axis][m % kWidth];
+        if (levels_.empty()) {
+            low = roundDown(samples_[m].position[axis]);
+            high = roundUp(samples_[m].position[axis]);
         } else {
-            const Octet& below = levels_[depth - 1][child / kWidth];
-            low = below.min[axis][child % kWidth];
-            high = below.max[axis][child % kWidth];
+            const Octet& below = levels_.back()[m];
+            low = *std::min_element(below.min[axis], below.min[axis] + kWidth);
+            high = *std::max_element(below.max[axis], below.max[axis] + kWidth);
         }
-        octet.min[axis][k] = std::min(octet.min[axis][k], low);
-        octet.max[axis][k] = std::max(octet.max[axis][k], high);
     }
 }
 
 void SampleIndex::restart() {
-    for (size_t i = 0; i < samples_.size(); ++i)
+    for (size_t i = 0; i < samples_.size(); ++i) {
         best_[i].store(packBest(kMaxRatio, kNoTag), std::memory_order_relaxed);
-    size_t nodes = samples_.size();
-    for (size_t level = 0; level < levels_.size(); ++level) {
-        nodes = (nodes + kWidth - 1) / kWidth;
-        for (size_t node = 0; node < nodes; ++node)
-            level == 0 ? refreshLeaf(node) : refreshOctet(level, node);
+        refreshSample(i);
     }
+    for (size_t level = 1; level < levels_.size(); ++level)
+        for (size_t m = 0; m < levels_[level - 1].size(); ++m) refreshMember(level, m);
 }
 
 float SampleIndex::ratio(size_t i) const {
     return std::bit_cast<float>(uint32_t(best_[i].load(std::memory_order_relaxed) >> 32));
 }
 
+void SampleIndex::refreshSample(size_t i) {
+    const float radius = roundUp(samples_[i].reach * ratio(i) * kRatioSlack);
+    levels_[0][i / kWidth].radius[i % kWidth].store(radius, std::memory_order_relaxed);
+}
+
 /// Concurrent refreshes may store an older, larger radius over a newer one: that is slower but
-/// safe, as radii only shrink.
-void SampleIndex::refreshLeaf(size_t leaf) {
-    float radius = 0;
-    for (size_t i = leaf * kWidth; i < std::min(samples_.size(), (leaf + 1) * kWidth); ++i)
-        radius = std::max(radius, roundUp(samples_[i].reach * ratio(i) * kRatioSlack));
-    levels_[0][leaf / kWidth].radius[leaf % kWidth].store(radius, std::memory_order_relaxed);
+/// safe, as radii only shrink. True if the radius has changed.
+bool SampleIndex::refreshMember(size_t level, size_t m) {
+    float radius = 0;  // absent members have that, too
+    for (const std::atomic<float>& below : levels_[level - 1][m].radius)
+        radius = std::max(radius, below.load(std::memory_order_relaxed));
+    std::atomic<float>& own = levels_[level][m / kWidth].radius[m % kWidth];
+    return own.exchange(radius, std::memory_order_relaxed) != radius;
 }
 
-void SampleIndex::refreshOctet(size_t level, size_t node) {
-    const Octet& below = levels_[level - 1][node];
-    float radius = 0;  // absent siblings have that, too
-    for (size_t k = 0; k < kWidth; ++k)
-        radius = std::max(radius, below.radius[k].load(std::memory_order_relaxed));
-    levels_[level][node / kWidth].radius[node % kWidth].store(radius, std::memory_order_relaxed);
+/// After the radii of an octet of samples have changed.
+void SampleIndex::refreshAbove(size_t leaf) {
+    size_t member = leaf;
+    for (size_t level = 1; level < levels_.size(); ++level, member /= kWidth)
+        if (!refreshMember(level, member)) return;
 }
 
-bool SampleIndex::visitLeaf(size_t leaf, Query& query) {
-    bool changed = false;
-    for (size_t i = leaf * kWidth; i < std::min(samples_.size(), (leaf + 1) * kWidth); ++i) {
-        const Sample& sample = samples_[i];
-        const double reach = sample.reach * query.reach;
-        const double look = reach * ratio(i) * kRatioSlack + kRounding;
-        if (query.boxDistanceSq(sample.position) > look * look) continue;
-        const uint64_t best = packBest(float(query.distance(sample.position) / reach), query.tag);
-        uint64_t before = best_[i].load(std::memory_order_relaxed);
-        while (best < before) {
-            changed = true;
-            if (best_[i].compare_exchange_weak(before, best, std::memory_order_relaxed)) break;
+/// Bit k: the triangles' box is no further from member k than that looks.
+unsigned SampleIndex::membersNear(const Octet& octet, const QueryBox& box, float reach) {
+    float gap_sq[kWidth] = {};
+    for (int axis = 0; axis < 3; ++axis) {
+        const float low = box.min[axis], high = box.max[axis];
+        for (size_t k = 0; k < kWidth;
+             ++k) {  // by values, not std::max: the compiler vectorises it
+            const float below = octet.min[axis][k] - high;
+            const float above = low - octet.max[axis][k];
+            const float either = below > above ? below : above;
+            const float gap = either > 0 ? either : 0;
+            gap_sq[k] += gap * gap;
         }
     }
-    if (changed) refreshLeaf(leaf);
-    return changed;
-}
-
-/// Visits those children of a node that the triangle may concern; they lie on `level`.
-bool SampleIndex::descend(size_t level, size_t node, Query& query) {
-    const Octet& octet = levels_[level][node];
-    float gap_sq[kWidth];
-    for (size_t k = 0; k < kWidth; ++k) {
-        gap_sq[k] = 0;
-        for (int axis = 0; axis < 3; ++axis) {
-            const float below = octet.min[axis][k] - query.max[axis];
-            const float above = query.min[axis] - octet.max[axis][k];
-            gap_sq[k] += square(std::max(std::max(below, above), 0.0f));
-        }
-    }
-    bool changed = false;
+    unsigned near = 0;
     for (size_t k = 0; k < kWidth; ++k) {
         const float radius = octet.radius[k].load(std::memory_order_relaxed);
-        const float look = radius * query.reach_up + float(kRounding);
-        if (gap_sq[k] * kGapSlack > square(look)) continue;
-        const size_t child = node * kWidth + k;
-        changed |= level == 0 ? visitLeaf(child, query) : descend(level - 1, child, query);
+        const float look = radius * reach + float(kRounding);
+        near |= unsigned(gap_sq[k] * kGapSlack <= square(look)) << k;
     }
-    if (changed && level + 1 < levels_.size()) refreshOctet(level + 1, node);
+    return near;
+}
+
+/// True if the triangle is the best so far for any sample of the octet.
+bool SampleIndex::visitLeaf(size_t leaf, Query& query, const Pass& pass) {
+    bool changed = false;
+    for (unsigned near = membersNear(levels_[0][leaf], query.box, pass.reach_up); near != 0;
+         near &= near - 1) {
+        const size_t i = leaf * kWidth + size_t(std::countr_zero(near));
+        const double d = query.distance(samples_[i].position);
+        const uint64_t best = packBest(float(d / (samples_[i].reach * pass.reach)), pass.tag);
+        uint64_t before = best_[i].load(std::memory_order_relaxed);
+        while (best < before &&
+               !best_[i].compare_exchange_weak(before, best, std::memory_order_relaxed)) {
+        }
+        if (best >= before) continue;
+        refreshSample(i);
+        changed = true;
+    }
     return changed;
+}
+
+/// Lists the octets of samples, below an octet of `level`, that look as far as the box. False if
+/// there are too many.
+bool SampleIndex::collectLeaves(size_t level, size_t octet, const QueryBox& box, Pass& pass) {
+    if (level == 0) {
+        if (pass.leaves.size() == pass.max_leaves) return false;
+        pass.leaves.push_back(uint32_t(octet));
+        return true;
+    }
+    for (unsigned near = membersNear(levels_[level][octet], box, pass.reach_up); near != 0;
+         near &= near - 1)
+        if (!collectLeaves(level - 1, octet * kWidth + size_t(std::countr_zero(near)), box, pass))
+            return false;
+    return true;
+}
+
+/// Neighbours in the stream mostly are neighbours in space, so they share the way down the tree; a
+/// run that concerns too many leaves is split.
+void SampleIndex::visitRun(size_t begin, size_t end, Pass& pass) {
+    QueryBox box;
+    for (size_t t = begin; t < end; ++t) box.add(pass.queries[t].box);
+    pass.leaves.clear();
+    pass.max_leaves = end - begin > 1 ? kMaxLeaves : samples_.size();
+    if (!collectLeaves(levels_.size() - 1, 0, box, pass)) {
+        const size_t middle = (begin + end) / 2;
+        visitRun(begin, middle, pass);
+        visitRun(middle, end, pass);
+        return;
+    }
+    for (const uint32_t leaf : pass.leaves) {
+        bool changed = false;
+        for (size_t t = begin; t < end; ++t) changed |= visitLeaf(leaf, pass.queries[t], pass);
+        if (changed) refreshAbove(leaf);
+    }
 }
 
 void SampleIndex::visit(std::span<const TriangleCorners> triangles, double reach, uint32_t tag) {
     CHECK(reach > 0 && std::isfinite(reach) && tag != kNoTag);
     if (samples_.empty()) return;
-    for (const TriangleCorners& triangle : triangles) {
-        Query query(triangle, reach, tag);
-        descend(levels_.size() - 1, 0, query);
+    Pass pass{reach, roundUp(reach), tag, {}, {}, 0};
+    for (size_t begin = 0; begin < triangles.size(); begin += kRun) {
+        const size_t end = std::min(triangles.size(), begin + kRun);
+        pass.queries.clear();
+        for (size_t t = begin; t < end; ++t) pass.queries.emplace_back(triangles[t]);
+        visitRun(0, pass.queries.size(), pass);
     }
 }
 

@@ -35,7 +35,7 @@ public:
     static constexpr uint32_t kNoTag = std::numeric_limits<uint32_t>::max();
 
     /// What n samples take, with what building the tree needs for a while.
-    static size_t bytesFor(size_t samples) { return samples * 128 + 4096; }
+    static size_t bytesFor(size_t samples) { return samples * 144 + 4096; }
 
     /// Throws MemoryError if the budget has not bytesFor(samples.size()); the budget must outlive
     /// this.
@@ -58,8 +58,12 @@ public:
 
 private:
     static constexpr size_t kWidth = 8;
+    static constexpr size_t kRun = 32;        // triangles that go down the tree together
+    static constexpr size_t kMaxLeaves = 64;  // that a run of several may concern
+    struct QueryBox;
     struct Query;
-    /// Boxes of eight siblings, one array a coordinate, so that they are tested side by side, and
+    struct Pass;
+    /// Boxes of eight members, one array a coordinate, so that they are tested side by side, and
     /// how far each still looks for triangles of reach 1.
     struct Octet {
         float min[3][kWidth];
@@ -68,19 +72,22 @@ private:
     };
 
     void buildTree();
-    void addBox(size_t depth, size_t child, Octet& octet, size_t k) const;
-    void refreshLeaf(size_t leaf);
-    void refreshOctet(size_t level, size_t octet);
-    bool descend(size_t level, size_t node, Query& query);
-    bool visitLeaf(size_t leaf, Query& query);
+    void setBox(Octet& octet, size_t m) const;
+    void refreshSample(size_t i);
+    bool refreshMember(size_t level, size_t m);
+    void refreshAbove(size_t leaf);
+    static unsigned membersNear(const Octet& octet, const QueryBox& box, float reach);
+    bool collectLeaves(size_t level, size_t octet, const QueryBox& box, Pass& pass);
+    bool visitLeaf(size_t leaf, Query& query, const Pass& pass);
+    void visitRun(size_t begin, size_t end, Pass& pass);
 
     Reservation reservation_;
     std::vector<Sample> samples_;
     // Ratio as a float's bits in the upper half, which sort as the float does, and tag below: the
     // least number is the best triangle.
     std::unique_ptr<std::atomic<uint64_t>[]> best_;
-    // Nodes of level 0 hold kWidth samples each, those above kWidth nodes each. Octet o of a level
-    // describes its nodes o*kWidth and on; the topmost level has one octet.
+    // Octet o of level 0 holds samples o*kWidth and on, one of level n octets o*kWidth and on of
+    // level n-1; the last level has one octet.
     std::vector<std::vector<Octet>> levels_;
 };
 

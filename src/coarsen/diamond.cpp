@@ -30,7 +30,9 @@ uint32_t cellQuota(uint64_t children_triangles, uint32_t patch_triangles, int le
     const uint64_t half = (children_triangles + 1) / 2;
     const uint64_t wanted =
         level < kTopLevels ? std::min(kSmallTopPatch, patch_triangles / 2) : patch_triangles / 2;
-    const uint64_t quota = std::max(half, std::min(children_triangles * 63 / 100, wanted));
+    uint64_t quota = std::max(half, std::min(children_triangles * 63 / 100, wanted));
+    // The roots, six at most, are what is resident always and drawn first.
+    if (level == 0) quota = std::min<uint64_t>(quota, patch_triangles / 4);
     return uint32_t(std::max(quota, std::min<uint64_t>(children_triangles, kSmallestPatch)));
 }
 
@@ -74,7 +76,12 @@ void DiamondWorker::merge(const DiamondInput& input) {
 void DiamondWorker::run(const DiamondInput& input, DiamondOutput& output) {
     merge(input);
     output.input_triangles = merged_.mesh.triangleCount();
-    CHECK_LT(size_t(0), merged_.mesh.triangleCount());
+    if (merged_.mesh.triangle.empty()) {  // its children kept nothing of what they had to show
+        output = DiamondOutput{};
+        output.cells.resize(input.children.size());
+        output.error = input.child_error;
+        return;
+    }
     SimplifyInput simplify;
     simplify.mesh = &merged_.mesh;
     simplify.cell = label_;

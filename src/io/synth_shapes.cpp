@@ -159,7 +159,9 @@ public:
 
 protected:
     Vec3d shape(const Vec3d& d) const override {
-        const double r = body(d) * (1 + folds(d) + marks(d));
+        double r = body(d) * (1 + folds(d) + marks(d));
+        // A flat foot: directions that point well down end on one plane.
+        if (d.z < -0.1) r = std::min(r, 0.95 / -d.z);
         return {0.62 * r * d.x, 0.52 * r * d.y, r * d.z};
     }
 
@@ -178,9 +180,7 @@ private:
         r += lobe(d, {1, 0.15 * chosen(5), 0.05 + 0.2 * chosen(6)}, 0.5, 14);  // shoulders
         r += lobe(d, {-1, 0.15 * chosen(7), 0.05 + 0.2 * chosen(8)}, 0.5, 14);
         r += lobe(d, {0.2 * chosen(9), 0.6, -0.3 + 0.2 * chosen(10)}, 0.3, 12);  // chest
-        // A plinth with a flat foot: directions that point well down end on one plane.
-        r += lobe(d, {0, 0, -1}, 0.6, 10);
-        if (d.z < -0.1) r = std::min(r, 0.95 / -d.z);
+        r += lobe(d, {0, 0, -1}, 0.6, 10);                                       // plinth
         return r;
     }
 
@@ -191,11 +191,11 @@ private:
         const Vec3d p = d + 0.2 * warp;
         const double wide = std::abs(valueNoise(Vec3d(9 * p.x, 9 * p.y, 3 * p.z), seed_ + 21));
         const double fine = std::abs(valueNoise(Vec3d(24 * p.x, 24 * p.y, 7 * p.z), seed_ + 22));
-        return 0.07 * (0.3 - wide) + 0.025 * (0.3 - fine);
+        return 0.035 * (0.3 - wide) + 0.012 * (0.3 - fine);
     }
 
     double marks(const Vec3d& d) const {
-        double sum = 0, height = 0.008, frequency = 16;
+        double sum = 0, height = 0.006, frequency = 16;
         for (int k = 0; k < octaves_; ++k, frequency *= 2, height *= 0.52)
             sum += height * valueNoise(frequency * d, seed_ + 31 + uint64_t(k));
         return sum;
@@ -256,16 +256,20 @@ private:
     /// Ridged noise whose finer octaves grow on the ridges of the coarser ones: mountains are
     /// rough, plains are smooth (after Musgrave's multifractal).
     double height(double x, double y) const {
-        const double wx = x + 0.08 * valueNoise(4 * x, 4 * y, seed_ + 1);
-        const double wy = y + 0.08 * valueNoise(4 * x, 4 * y, seed_ + 2);
-        double sum = 90 * valueNoise(1.5 * wx, 1.5 * wy, seed_ + 3);
-        double weight = 1, amplitude = 90, frequency = 3;
-        for (int k = 0; k < octaves_; ++k, frequency *= 2, amplitude *= 0.47) {
+        const double wx = x + 0.06 * valueNoise(4 * x, 4 * y, seed_ + 1);
+        const double wy = y + 0.06 * valueNoise(4 * x, 4 * y, seed_ + 2);
+        double sum = 20 + 45 * valueNoise(2 * wx, 2 * wy, seed_ + 3);
+        double weight = std::clamp(0.4 + sum / 60, 0.1, 1.0), amplitude = 80, frequency = 4;
+        for (int k = 0; k < octaves_; ++k, frequency *= 2, amplitude *= 0.5) {
+            // Turned by some angle each time, or the lattice of the noise shows.
+            const double u = 0.8 * wx - 0.6 * wy, v = 0.6 * wx + 0.8 * wy;
+            const bool turned = k % 2 == 1;
             const double noise =
-                valueNoise(frequency * wx, frequency * wy, seed_ + 10 + uint64_t(k));
+                valueNoise(frequency * (turned ? u : wx), frequency * (turned ? v : wy),
+                           seed_ + 10 + uint64_t(k));
             const double ridge = (1 - std::abs(noise)) * (1 - std::abs(noise));
-            sum += amplitude * weight * (ridge - 0.35);
-            weight = std::clamp(1.4 * weight * ridge + 0.12, 0.0, 1.0);
+            sum += amplitude * weight * (ridge - 0.45);
+            weight = std::clamp(weight * (0.35 + 1.1 * ridge), 0.0, 1.0);
         }
         return sum;
     }

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "base/check.h"
+#include "base/error.h"
 #include "runtime/export_cut.h"
 #include "runtime/patch_reader.h"
 #include "store/model_writer.h"
@@ -112,26 +113,11 @@ private:
     }
 };
 
-using Corner = std::array<double, 3>;
-std::multiset<std::array<Corner, 3>> soupOf(const MemoryWriter& mesh) {
-    std::multiset<std::array<Corner, 3>> soup;
-    for (const auto& t : mesh.triangle) {
-        std::array<Corner, 3> corners;
-        for (int k = 0; k < 3; ++k) {
-            const Vec3d& p = mesh.position.at(t[size_t(k)]);
-            corners[size_t(k)] = {p.x, p.y, p.z};
-        }
-        std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()),
-                    corners.end());
-        soup.insert(corners);
-    }
-    return soup;
-}
-
 ExportReport exportAll(const ModelReader& model, MemoryWriter& writer, size_t budget_bytes) {
     Budget budget(budget_bytes);
     Progress progress;
-    return exportCut(model, finestCut(model.nodes()), writer, budget, 3, progress);
+    const ExportSettings settings{fs::temp_directory_path().string(), 3};
+    return exportCut(model, finestCut(model.nodes()), writer, settings, budget, progress);
 }
 
 TEST_F(ExportTest, sharedVerticesAreWrittenOnceAndEdgesClose) {
@@ -139,7 +125,6 @@ TEST_F(ExportTest, sharedVerticesAreWrittenOnceAndEdgesClose) {
     MemoryWriter writer(meshOutputOf(model, finestCut(model.nodes())));
     const ExportReport report = exportAll(model, writer, size_t(64) << 20);
     EXPECT_TRUE(writer.finished);
-    EXPECT_FALSE(report.repeated);
     constexpr uint64_t side = kPatches * kSide;
     EXPECT_EQ(report.triangles, 2 * side * side);
     EXPECT_EQ(report.vertices, side * (side + 1));  // around in x, open in y
@@ -157,16 +142,16 @@ TEST_F(ExportTest, sharedVerticesAreWrittenOnceAndEdgesClose) {
         EXPECT_EQ(writer.scalar[v], float((writer.position[v].x - 10) / 0.5 - 1000) / 16);
 }
 
-TEST_F(ExportTest, shortMemoryRepeatsVerticesButLosesNothing) {
+TEST_F(ExportTest, memoryChangesNothing) {
     const ModelReader model(pathTo("sheet.pietra"));
     MemoryWriter all(meshOutputOf(model, finestCut(model.nodes()))),
         tight(meshOutputOf(model, finestCut(model.nodes())));
     exportAll(model, all, size_t(64) << 20);
-    const ExportReport report = exportAll(model, tight, 20'000);
-    EXPECT_TRUE(report.repeated);
-    EXPECT_GT(report.vertices, all.position.size());
-    EXPECT_EQ(report.triangles, all.triangle.size());
-    EXPECT_EQ(soupOf(all), soupOf(tight));
+    exportAll(model, tight, 200'000);
+    EXPECT_EQ(tight.position, all.position);
+    EXPECT_EQ(tight.scalar, all.scalar);
+    EXPECT_EQ(tight.triangle, all.triangle);
+    EXPECT_THROW(exportAll(model, tight, 1000), MemoryError);
 }
 
 TEST_F(ExportTest, patchesComeOnceAndInOrder) {

@@ -5,37 +5,53 @@
 
 namespace pietra {
 
-void Collapser::findWings(uint32_t u, uint32_t v) {
-    wing_count_ = 0;
-    const Fan& fan = mesh_.fan[u];
+/// Reads the fan of u into the ring and the triangles on the edge into the wings; marks u's link
+/// and the wings' vertices. Drops dead corners from the fan. False if the edge has none or too many
+/// triangles, or two on the same three vertices.
+bool Collapser::readFirstRing(uint32_t u, uint32_t v) {
+    Fan& fan = mesh_.fan[u];
+    uint32_t* corners = mesh_.corner.data() + fan.begin;
+    const uint32_t in_link = mesh_.epoch += 2, is_wing = in_link + 1;
+    uint32_t alive = 0, size = 0, wings = 0;
     for (uint32_t i = 0; i < fan.count; ++i) {
-        const uint32_t corner = mesh_.corner[fan.begin + i];
+        const uint32_t corner = corners[i];
         const Face& face = mesh_.face[corner >> 2];
         if (face.dead()) continue;
-        const uint32_t k = corner & 3, n = kNextCorner[k], p = kPreviousCorner[k];
-        if (face.v[n] != v && face.v[p] != v) continue;
-        if (wing_count_ == wing_.size()) {
-            wing_count_ = 0;  // four triangles: never collapsible
-            return;
+        corners[alive++] = corner;
+        const uint32_t k = corner & 3;
+        const uint32_t n = face.v[kNextCorner[k]], p = face.v[kPreviousCorner[k]];
+        if (n == v || p == v) {
+            wing_[std::min(wings++, kMaxWings)] = {
+                corner >> 2, n == v ? p : n, face.edgeClass(n == v ? kPreviousCorner[k] : k),
+                face.edgeClass(kNextCorner[k]), EdgeClass::kManifold};
+            continue;
         }
-        const bool forward = face.v[n] == v;
-        wing_[wing_count_++] = {corner >> 2, forward ? face.v[p] : face.v[n],
-                                face.edgeClass(forward ? p : k), face.edgeClass(n),
-                                EdgeClass::kManifold};
+        ring_.corner[size] = corner;
+        ring_.apex[size] = u;
+        ring_.next[size] = n;
+        ring_.previous[size] = p;
+        ++size;
+        mesh_.mark[n] = mesh_.mark[p] = in_link;
     }
+    fan.count = alive;
+    ring_.size_u = ring_.size = size;
+    if (wings == 0 || wings > kMaxWings) return false;
+    wing_count_ = wings;
+    for (uint32_t i = 0; i < wings; ++i) {
+        uint32_t& mark = mesh_.mark[wing_[i].vertex];
+        if (mark == is_wing) return false;
+        mark = is_wing;
+    }
+    return true;
 }
 
-bool Collapser::quotaAllows() const {
-    for (uint32_t i = 0; i < wing_count_; ++i)
-        if (mesh_.cellAbove(mesh_.face[wing_[i].face].cell())) return true;
-    return false;
-}
-
-/// Of the two edges that become one, one must be an ordinary edge with both its triangles in here:
-/// then the other one's uses are the new edge's.
-bool Collapser::mergeWingClasses(const Point& u, const Point& v) {
+/// Some triangle that dies must be of a cell above its quota. And of two edges that become one, one
+/// must be ordinary with both its triangles in here: then the other's uses are the new edge's.
+bool Collapser::wingsAllow(const Point& u, const Point& v) {
+    bool wanted = false;
     for (uint32_t i = 0; i < wing_count_; ++i) {
         Wing& w = wing_[i];
+        wanted |= mesh_.cellAbove(mesh_.face[w.face].cell());
         if (w.to_u == EdgeClass::kManifold && w.to_v == EdgeClass::kManifold) continue;
         const bool outer = mesh_.point[w.vertex].outer();
         if (w.to_u == EdgeClass::kManifold && !(outer && u.outer()))
@@ -45,14 +61,18 @@ bool Collapser::mergeWingClasses(const Point& u, const Point& v) {
         else
             return false;
     }
-    return true;
+    return wanted;
 }
 
-/// Appends to the ring. Also drops dead corners from the fan.
-void Collapser::readRing(uint32_t v, uint32_t other) {
+/// Appends the fan of v to the ring, and checks the link condition: both ends share no neighbours
+/// but those across the edge's triangles, and no edge of their links (or two triangles would become
+/// one: a closed tetrahedron has such).
+bool Collapser::readSecondRing(uint32_t v, uint32_t u) {
     Fan& fan = mesh_.fan[v];
     uint32_t* corners = mesh_.corner.data() + fan.begin;
+    const uint32_t in_link = mesh_.epoch, is_wing = in_link + 1;
     uint32_t alive = 0, size = ring_.size;
+    bool allowed = true;
     for (uint32_t i = 0; i < fan.count; ++i) {
         const uint32_t corner = corners[i];
         const Face& face = mesh_.face[corner >> 2];
@@ -60,42 +80,29 @@ void Collapser::readRing(uint32_t v, uint32_t other) {
         corners[alive++] = corner;
         const uint32_t n = face.v[kNextCorner[corner & 3]];
         const uint32_t p = face.v[kPreviousCorner[corner & 3]];
+        if (n == u || p == u) continue;
         ring_.corner[size] = corner;
         ring_.apex[size] = v;
         ring_.next[size] = n;
         ring_.previous[size] = p;
-        size += n != other && p != other;
+        ++size;
+        const uint32_t mark_n = mesh_.mark[n], mark_p = mesh_.mark[p];
+        allowed &= mark_n != in_link && mark_p != in_link;
+        if (mark_n == is_wing && mark_p == is_wing) [[unlikely]]
+            allowed = allowed && !facesMeet(n, p);
     }
     fan.count = alive;
     ring_.size = size;
+    return allowed && size != 0;
 }
 
-/// The link condition: both ends share no neighbours but those across the edge's triangles, and no
-/// edge of their links (or two triangles would become one: a closed tetrahedron has such).
-bool Collapser::linksAllow() {
-    const uint32_t in_link = mesh_.epoch + 1, is_wing = mesh_.epoch + 2;
-    mesh_.epoch += 2;
-    for (uint32_t i = 0; i < wing_count_; ++i) {
-        uint32_t& mark = mesh_.fan[wing_[i].vertex].mark;
-        if (mark == is_wing) return false;
-        mark = is_wing;
-    }
-    const auto markLink = [&](uint32_t w) {
-        uint32_t& mark = mesh_.fan[w].mark;
-        mark = mark == is_wing ? is_wing : in_link;
-        return mark == is_wing;
-    };
-    bool wings_joined = false;
+/// True if u has a triangle on the edge (a, b).
+bool Collapser::facesMeet(uint32_t a, uint32_t b) const {
     for (uint32_t i = 0; i < ring_.size_u; ++i) {
-        const bool next_is_wing = markLink(ring_.next[i]);
-        wings_joined |= markLink(ring_.previous[i]) && next_is_wing;
+        const uint32_t n = ring_.next[i], p = ring_.previous[i];
+        if ((n == a && p == b) || (n == b && p == a)) return true;
     }
-    for (uint32_t i = ring_.size_u; i < ring_.size; ++i) {
-        const uint32_t n = mesh_.fan[ring_.next[i]].mark, p = mesh_.fan[ring_.previous[i]].mark;
-        if (n == in_link || p == in_link) return false;
-        if (wings_joined && n == is_wing && p == is_wing) return false;
-    }
-    return true;
+    return false;
 }
 
 /// True if the removed vertex, merged into an outer one, would make a new edge to an outer vertex:
@@ -134,9 +141,9 @@ bool hasArea(const Vec3f& a, const Vec3f& b) {
 /// None of the ring's first `count` triangles may turn by more than acos(0.2), become a sliver or
 /// lose its area when its apex goes to `to`.
 bool Collapser::keepsShapes(uint32_t count, const Vec3f& to) {
-    for (uint32_t pad = ring_.size; pad % kBatch != 0; ++pad)
+    for (uint32_t pad = ring_.size; pad % kFoldBatch != 0; ++pad)
         ring_.apex[pad] = ring_.next[pad] = ring_.previous[pad] = 0;  // any valid vertex
-    for (uint32_t i = 0; i < count; i += kBatch) {
+    for (uint32_t i = 0; i < count; i += kFoldBatch) {
         uint32_t suspects = kernels_.foldingTriangles(mesh_.point.data(), &ring_.apex[i],
                                                       &ring_.next[i], &ring_.previous[i], to);
         for (; suspects != 0; suspects &= suspects - 1) {
@@ -170,15 +177,8 @@ bool Collapser::keepsShape(uint32_t i, const Vec3f& to) const {
 
 bool Collapser::tryCollapse(uint32_t u, uint32_t v, const Vec3f& to) {
     if (mesh_.fan[u].count + mesh_.fan[v].count > kMaxRing) return false;
-    findWings(u, v);
-    if (wing_count_ == 0 || !quotaAllows()) return false;
     const Point &pu = mesh_.point[u], &pv = mesh_.point[v];
-    if (!mergeWingClasses(pu, pv)) return false;
-    ring_.size = 0;
-    readRing(u, v);
-    ring_.size_u = ring_.size;
-    readRing(v, u);
-    if (ring_.size == 0 || !linksAllow()) return false;
+    if (!readFirstRing(u, v) || !wingsAllow(pu, pv) || !readSecondRing(v, u)) return false;
     if (pv.outer() && makesOuterEdge()) return false;
     if (positions_.occupied(mesh_, to, u, v)) return false;
     const bool v_moves = pv.rank() == pu.rank();
@@ -193,9 +193,9 @@ void Collapser::apply(uint32_t u, uint32_t v, const Vec3f& to) {
     q.add(mesh_.quadric[v].movedBy(to - pv.vec()));
     mesh_.quadric[v] = q;
     pv = {to.x, to.y, to.z, pv.flags | (pu.flags & kIrregularFlag)};
-    pu.flags |= kDeadFlag;
+    mesh_.killVertex(u);
     mesh_.parent[u] = v;
-    ++mesh_.fan[v].stamp;
+    ++mesh_.stamp[v];
     for (uint32_t i = 0; i < ring_.size_u; ++i)
         mesh_.face[ring_.corner[i] >> 2].v[ring_.corner[i] & 3] = v;
     for (uint32_t i = 0; i < wing_count_; ++i) {

@@ -25,7 +25,7 @@ inline bool collapsibleEdge(const WorkingMesh& mesh, const Face& face, uint32_t 
 struct Ring {
     uint32_t size = 0;    ///< of both
     uint32_t size_u = 0;  ///< those of u
-    std::array<uint32_t, kMaxRing + kBatch> corner, apex, next, previous;
+    std::array<uint32_t, kMaxRing + kFoldBatch> corner, apex, next, previous;
 };
 
 /// A triangle on the collapsing edge (u, v): it dies, and its edges to `vertex` become one.
@@ -35,6 +35,8 @@ struct Wing {
     EdgeClass to_u, to_v;
     EdgeClass merged;
 };
+
+inline constexpr uint32_t kMaxWings = 3;
 
 /// Tests and performs collapses; holds the walks' scratch.
 class Collapser {
@@ -50,11 +52,10 @@ public:
     const Ring& ring() const { return ring_; }
 
 private:
-    void findWings(uint32_t u, uint32_t v);
-    bool quotaAllows() const;
-    bool mergeWingClasses(const Point& u, const Point& v);
-    void readRing(uint32_t v, uint32_t other);
-    bool linksAllow();
+    bool readFirstRing(uint32_t u, uint32_t v);
+    bool readSecondRing(uint32_t v, uint32_t u);
+    bool wingsAllow(const Point& u, const Point& v);
+    bool facesMeet(uint32_t a, uint32_t b) const;
     bool makesOuterEdge() const;
     bool keepsShapes(uint32_t count, const Vec3f& to);
     bool keepsShape(uint32_t i, const Vec3f& to) const;
@@ -66,7 +67,7 @@ private:
     PositionSet& positions_;
     EdgeKernels kernels_;
     Ring ring_;
-    std::array<Wing, 3> wing_;
+    std::array<Wing, kMaxWings + 1> wing_;
     uint32_t wing_count_ = 0;
 };
 

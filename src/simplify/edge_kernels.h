@@ -1,5 +1,5 @@
 #pragma once
-// The two inner loops of the simplifier, eight at a time, through Highway: where do edges collapse
+// The two inner loops of the simplifier, many at a time, through Highway: where do edges collapse
 // to and at what cost, and which triangles might fold. Equal results on every instruction set:
 // elementwise IEEE operations in one order, no fused multiply-add.
 
@@ -9,7 +9,10 @@
 
 namespace pietra {
 
-inline constexpr uint32_t kBatch = 8;
+/// Edges evaluated together: two vectors of AVX2, one of AVX-512.
+inline constexpr uint32_t kBatch = 16;
+/// Triangles tested together.
+inline constexpr uint32_t kFoldBatch = 8;
 
 /// Where new vertices may lie, relative to the mesh's centre.
 struct SnapGrid {
@@ -17,8 +20,8 @@ struct SnapGrid {
     Vec3f low{0, 0, 0}, high{0, 0, 0};
 };
 
-/// Edges to evaluate; fill all eight lanes (repeat one that is there).
-struct alignas(32) EdgeBatch {
+/// Edges to evaluate; fill all lanes (repeat one that is there).
+struct alignas(64) EdgeBatch {
     uint32_t u[kBatch], v[kBatch];
     float cost[kBatch];  ///< the quadrics' value at the place, >= 0
     float x[kBatch], y[kBatch],

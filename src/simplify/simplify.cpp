@@ -28,7 +28,9 @@ Vec3i centreOf(const Mesh& mesh) {
 }
 
 void buildFans(WorkingMesh& mesh) {
-    mesh.fan.assign(mesh.point.size(), Fan{0, 0, 0, 0});
+    mesh.fan.assign(mesh.point.size(), Fan{0, 0});
+    mesh.stamp.assign(mesh.point.size(), 0);
+    mesh.mark.assign(mesh.point.size(), 0);
     mesh.epoch = 0;
     for (const Face& face : mesh.face)
         for (const uint32_t v : face.v) ++mesh.fan[v].count;
@@ -57,8 +59,10 @@ void addCurvePlanes(WorkingMesh& mesh, const Face& face, const Vec3f& normal) {
         const float length_sq = glm::dot(across, across);
         if (!(length_sq > 0)) continue;
         const Vec3f unit = across / std::sqrt(length_sq);
-        mesh.quadric[a].addPlane(unit, kCurveWeight * length_sq);
-        mesh.quadric[b].addPlane(unit, kCurveWeight * length_sq);
+        Quadric q = Quadric::ofPlane(unit, kCurveWeight * length_sq);
+        q.area = 0;
+        mesh.quadric[a].addMatrix(q);
+        mesh.quadric[b].addMatrix(q);
     }
 }
 
@@ -71,11 +75,8 @@ void buildQuadrics(WorkingMesh& mesh) {
         const float area = std::sqrt(glm::dot(cross, cross));
         if (!(area > 0)) continue;
         const Vec3f normal = cross / area;
-        for (const uint32_t v : face.v) {
-            mesh.quadric[v].addPlane(normal, area);
-            mesh.quadric[v].addRegulariser(area);
-            mesh.quadric[v].area += area;
-        }
+        const Quadric q = Quadric::ofPlane(normal, area);
+        for (const uint32_t v : face.v) mesh.quadric[v].addMatrix(q);
         if (face.classes() != 0) addCurvePlanes(mesh, face, normal);
     }
 }
@@ -90,6 +91,13 @@ uint8_t mixBytes(uint8_t a, uint8_t b, float t) {
 }
 
 }  // namespace
+
+/// Edges taken from the queue to be collapsed.
+struct Candidates {
+    EdgeBatch edges;
+    std::array<uint32_t, kBatch> stamp;
+    uint32_t count = 0;
+};
 
 struct Simplifier::State {
     WorkingMesh mesh;
@@ -115,16 +123,20 @@ struct Simplifier::State {
     void pushAllEdges();
     void pushEdgesAround(uint32_t v);
     bool stillThere(uint32_t u, uint32_t v, uint32_t stamp) const {
-        return !mesh.point[u].dead() && !mesh.point[v].dead() &&
-               mesh.fan[u].stamp + mesh.fan[v].stamp == stamp;
+        return mesh.stamp[u] + mesh.stamp[v] == stamp;
     }
-    uint32_t popCandidates(EdgeBatch& batch, uint32_t* stamps);
-    uint32_t drainQueue();
+    void popCandidates(Candidates& batch);
+    void collapseCandidates(Candidates& batch);
+    void drainQueue();
+    Candidates candidates;
+    uint32_t collapses = 0;
     float worst_deviation_sq = 0;
     void mixAttributes(uint32_t removed, uint32_t kept, const Vec3f& from, const Vec3f& to,
                        const Vec3f& at);
     void fallBack(float droppable_error, SimplifyOutput& output);
     void store(const SimplifyInput& input, SimplifyOutput& output);
+    void storeVertices(const Mesh& in, SimplifyOutput& out);
+    void storeTriangles(const Mesh& in, SimplifyOutput& out);
 };
 
 void Simplifier::State::load(const SimplifyInput& input) {
@@ -164,6 +176,7 @@ void Simplifier::State::load(const SimplifyInput& input) {
     grid.high = Vec3f(Vec3i(kLatticeMax) - mesh.centre);
     queue.clear();
     worst_deviation_sq = 0;
+    collapses = 0;
 }
 
 void Simplifier::State::buildPositions() {
@@ -187,7 +200,8 @@ void Simplifier::State::flushPending() {
     kernels.place(mesh.point.data(), mesh.quadric.data(), grid, pending);
     for (uint32_t i = 0; i < pending_count; ++i) {
         const uint32_t u = pending.u[i], v = pending.v[i];
-        queue.push(pending.cost[i], u, v, mesh.fan[u].stamp + mesh.fan[v].stamp);
+        const uint32_t stamp = mesh.stamp[u] + mesh.stamp[v];
+        if (stamp < WorkingMesh::kDeadStamp) queue.push(pending.cost[i], {u, v, stamp});
     }
     pending_count = 0;
 }
@@ -209,10 +223,10 @@ void Simplifier::State::pushAllEdges() {
 /// The edges of `v`, whose ring the collapser has just read.
 void Simplifier::State::pushEdgesAround(uint32_t v) {
     const Ring& ring = collapser.ring();
-    const uint32_t epoch = ++mesh.epoch;
+    const uint32_t epoch = mesh.epoch += 2;
     const auto visit = [&](uint32_t w, const Face& face, uint32_t edge) {
-        if (mesh.fan[w].mark == epoch) return;
-        mesh.fan[w].mark = epoch;
+        if (mesh.mark[w] == epoch) return;
+        mesh.mark[w] = epoch;
         if (collapsibleEdge(mesh, face, edge)) pushEdge(v, w);
     };
     for (uint32_t i = 0; i < ring.size; ++i) {
@@ -240,53 +254,49 @@ void Simplifier::State::mixAttributes(uint32_t removed, uint32_t kept, const Vec
     }
 }
 
-/// Up to eight edges from the lowest bucket, as they are now, with their places. 0: none left.
-uint32_t Simplifier::State::popCandidates(EdgeBatch& batch, uint32_t* stamps) {
-    uint32_t count = 0;
-    while (count == 0) {
-        std::array<CollapseQueue::Entry, kBatch> entries;
-        const uint32_t popped = queue.popBatch(entries.data(), kBatch);
-        if (popped == 0) return 0;
-        for (uint32_t i = 0; i < popped; ++i) {
-            const auto& e = entries[i];
-            if (!stillThere(e.u, e.v, e.stamp)) continue;
-            const bool swap = mesh.point[e.u].rank() > mesh.point[e.v].rank();
-            batch.u[count] = swap ? e.v : e.u;
-            batch.v[count] = swap ? e.u : e.v;
-            stamps[count++] = e.stamp;
-        }
+/// Edges of the lowest bucket as they are now, up to sixteen; fewer, or none, where it has no more.
+void Simplifier::State::popCandidates(Candidates& batch) {
+    batch.count = 0;
+    const uint32_t bucket = queue.lowestBucket();
+    if (bucket == CollapseQueue::kNoBucket) return;
+    while (batch.count < kBatch && !queue.empty(bucket)) {
+        const CollapseQueue::Entry e = queue.pop(bucket);
+        if (!stillThere(e.u, e.v, e.stamp)) continue;
+        const bool swap = mesh.point[e.u].rank() > mesh.point[e.v].rank();
+        batch.edges.u[batch.count] = swap ? e.v : e.u;
+        batch.edges.v[batch.count] = swap ? e.u : e.v;
+        batch.stamp[batch.count++] = e.stamp;
     }
-    for (uint32_t i = count; i < kBatch; ++i) {
-        batch.u[i] = batch.u[0];
-        batch.v[i] = batch.v[0];
-    }
-    kernels.place(mesh.point.data(), mesh.quadric.data(), grid, batch);
-    return count;
 }
 
-uint32_t Simplifier::State::drainQueue() {
-    uint32_t collapses = 0;
-    EdgeBatch batch;
-    std::array<uint32_t, kBatch> stamps;
-    while (mesh.cells_above > 0) {
-        const uint32_t count = popCandidates(batch, stamps.data());
-        if (count == 0) break;
-        for (uint32_t i = 0; i < count && mesh.cells_above > 0; ++i) {
-            const uint32_t u = batch.u[i], v = batch.v[i];
-            if (!stillThere(u, v, stamps[i])) continue;
-            const Vec3f from = mesh.point[u].vec(), to = mesh.point[v].vec();
-            const Vec3f at{batch.x[i], batch.y[i], batch.z[i]};
-            if (!collapser.tryCollapse(u, v, at)) continue;
-            ++collapses;
-            if (!positions.insert(mesh, v)) buildPositions();
-            const float area = mesh.quadric[v].area;
-            if (area > 0) worst_deviation_sq = std::max(worst_deviation_sq, batch.cost[i] / area);
-            mixAttributes(u, v, from, to, at);
-            pushEdgesAround(v);
-        }
-        flushPending();
+void Simplifier::State::collapseCandidates(Candidates& batch) {
+    EdgeBatch& edges = batch.edges;
+    for (uint32_t i = batch.count; i < kBatch; ++i) {
+        edges.u[i] = edges.u[0];
+        edges.v[i] = edges.v[0];
     }
-    return collapses;
+    kernels.place(mesh.point.data(), mesh.quadric.data(), grid, edges);
+    for (uint32_t i = 0; i < batch.count && mesh.cells_above > 0; ++i) {
+        const uint32_t u = edges.u[i], v = edges.v[i];
+        if (!stillThere(u, v, batch.stamp[i])) continue;
+        const Vec3f from = mesh.point[u].vec(), to = mesh.point[v].vec();
+        const Vec3f at{edges.x[i], edges.y[i], edges.z[i]};
+        if (!collapser.tryCollapse(u, v, at)) continue;
+        ++collapses;
+        if (!positions.insert(mesh, v)) buildPositions();
+        const float area = mesh.quadric[v].area;
+        if (area > 0) worst_deviation_sq = std::max(worst_deviation_sq, edges.cost[i] / area);
+        mixAttributes(u, v, from, to, at);
+        pushEdgesAround(v);
+    }
+    flushPending();
+}
+
+void Simplifier::State::drainQueue() {
+    while (mesh.cells_above > 0 && queue.lowestBucket() != CollapseQueue::kNoBucket) {
+        popCandidates(candidates);
+        if (candidates.count > 0) collapseCandidates(candidates);
+    }
 }
 
 void Simplifier::State::fallBack(float droppable_error, SimplifyOutput& output) {
@@ -301,43 +311,59 @@ void Simplifier::State::fallBack(float droppable_error, SimplifyOutput& output) 
 }
 
 void Simplifier::State::store(const SimplifyInput& input, SimplifyOutput& out) {
-    const Mesh& in = *input.mesh;
-    out.mesh.clear();
-    out.cell.clear();
-    out.triangle_changed.clear();
-    out.triangle_map.assign(in.triangleCount(), kNone);
-    out.vertex_map.assign(in.vertexCount(), kNone);
-    new_vertex.assign(in.vertexCount(), kNone);
+    storeVertices(*input.mesh, out);
+    storeTriangles(*input.mesh, out);
+}
+
+void Simplifier::State::storeVertices(const Mesh& in, SimplifyOutput& out) {
+    const size_t count = in.vertexCount();
+    new_vertex.assign(count, kNone);
     for (const Face& face : mesh.face)
         if (!face.dead())
             for (const uint32_t v : face.v) new_vertex[v] = 0;
     uint32_t next = 0;
-    for (uint32_t v = 0; v < in.vertexCount(); ++v) {
-        const uint32_t root = mesh.root(v);
-        if (new_vertex[root] == kNone) continue;
-        if (root != v) continue;
-        new_vertex[v] = next++;
-        out.mesh.position.push_back(mesh.latticePosition(v));
-        out.mesh.normal.push_back(normal[v]);
-        if (!colour.empty()) out.mesh.colour.push_back(colour[v]);
-        const auto first = scalar.begin() + ptrdiff_t(v) * scalar_count;
-        out.mesh.scalar.insert(out.mesh.scalar.end(), first, first + scalar_count);
+    for (uint32_t& index : new_vertex)
+        if (index != kNone) index = next++;
+    out.mesh.position.resize(next);
+    out.mesh.normal.resize(next);
+    out.mesh.colour.resize(colour.empty() ? 0 : next);
+    out.mesh.scalar.resize(size_t(next) * scalar_count);
+    out.vertex_map.resize(count);
+    for (uint32_t v = 0; v < count; ++v) {
+        const uint32_t to = new_vertex[mesh.root(v)];
+        out.vertex_map[v] = to;
+        if (to == kNone || mesh.parent[v] != v) continue;
+        out.mesh.position[to] = mesh.latticePosition(v);
+        out.mesh.normal[to] = normal[v];
+        if (!colour.empty()) out.mesh.colour[to] = colour[v];
+        for (int i = 0; i < scalar_count; ++i)
+            out.mesh.scalar[size_t(to) * scalar_count + i] = scalar[size_t(v) * scalar_count + i];
     }
-    for (uint32_t v = 0; v < in.vertexCount(); ++v) out.vertex_map[v] = new_vertex[mesh.root(v)];
+}
+
+void Simplifier::State::storeTriangles(const Mesh& in, SimplifyOutput& out) {
+    uint32_t alive = 0;
+    for (const Face& face : mesh.face) alive += !face.dead();
+    out.mesh.triangle.resize(alive);
+    out.mesh.edge_class.resize(alive);
+    out.cell.resize(alive);
+    out.triangle_changed.resize(alive);
+    out.triangle_map.resize(mesh.face.size());
+    uint32_t next = 0;
     for (uint32_t f = 0; f < mesh.face.size(); ++f) {
         const Face& face = mesh.face[f];
+        out.triangle_map[f] = face.dead() ? kNone : next;
         if (face.dead()) continue;
-        out.triangle_map[f] = uint32_t(out.mesh.triangle.size());
-        Triangle t;
+        Triangle& t = out.mesh.triangle[next];
         bool changed = false;
         for (uint32_t k = 0; k < 3; ++k) {
             t[k] = new_vertex[face.v[k]];
             changed |= out.mesh.position[t[k]] != in.position[in.triangle[f][k]];
         }
-        out.mesh.triangle.push_back(t);
-        out.mesh.edge_class.push_back(uint8_t(face.classes()));
-        out.cell.push_back(uint8_t(face.cell()));
-        out.triangle_changed.push_back(changed);
+        out.mesh.edge_class[next] = uint8_t(face.classes());
+        out.cell[next] = uint8_t(face.cell());
+        out.triangle_changed[next] = changed;
+        ++next;
     }
 }
 
@@ -353,13 +379,14 @@ void Simplifier::run(const SimplifyInput& input, SimplifyOutput& output) {
     output.locked_vertices = classifyVertices(s.mesh);
     buildQuadrics(s.mesh);
     s.buildPositions();
-    output.collapses = output.clustered = output.dropped_triangles = 0;
+    output.clustered = output.dropped_triangles = 0;
     while (s.mesh.cells_above > 0) {
         s.pushAllEdges();
-        const uint32_t collapses = s.drainQueue();
-        if (collapses == 0) break;
-        output.collapses += collapses;
+        const uint32_t before = s.collapses;
+        s.drainQueue();
+        if (s.collapses == before) break;
     }
+    output.collapses = s.collapses;
     output.estimated_error = std::sqrt(s.worst_deviation_sq);
     if (s.mesh.cells_above > 0) s.fallBack(input.droppable_error, output);
     s.store(input, output);

@@ -37,7 +37,7 @@ inline constexpr uint32_t kMaxPageVertices = 3 << 22;
 
 /// Which body a page has. kBest tries the smaller ones first and falls back to kPlain, which takes
 /// every mesh.
-enum class PageCodec : uint8_t { kPlain = 0, kBest = 255 };
+enum class PageCodec : uint8_t { kPlain = 0, kFront = 1, kBest = 255 };
 
 /// Patches may be empty, and have vertices that no triangle uses. CHECKs that positions lie on the
 /// lattice (0 to kLatticeMax, multiples of 2^shift) and that every array has its length.

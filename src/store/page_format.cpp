@@ -14,7 +14,12 @@ namespace pietra {
 namespace {
 
 constexpr uint8_t kColoursFlag = 1;
-constexpr int kZstdLevel = 1;  // the streams are entropy-coded residuals: no level does much better
+// The streams are residuals: they have to be entropy-coded, and have no repetitions worth a search.
+// Short chance matches cost more than the literals they replace: ask for long ones, in a small
+// table.
+constexpr int kZstdLevel = 1;
+constexpr int kZstdMinMatch = 7;
+constexpr int kZstdHashLog = 6;
 
 struct FreeContext {
     void operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }
@@ -165,6 +170,8 @@ void StreamPacker::write(ByteWriter& writer) {
     ZSTD_CCtx* context = threadCompressor();
     ZSTD_CCtx_reset(context, ZSTD_reset_session_and_parameters);
     ZSTD_CCtx_setParameter(context, ZSTD_c_compressionLevel, kZstdLevel);
+    ZSTD_CCtx_setParameter(context, ZSTD_c_minMatch, kZstdMinMatch);
+    ZSTD_CCtx_setParameter(context, ZSTD_c_hashLog, kZstdHashLog);
     ZSTD_CCtx_setPledgedSrcSize(context, total);
     frame_.resize(ZSTD_compressBound(total) + 16 * (used_ + 1));
     ZSTD_outBuffer out{frame_.data(), frame_.size(), 0};
@@ -199,11 +206,11 @@ bool StreamUnpacker::read(ByteReader& reader, size_t count, uint64_t longest, ui
         fault = "its compressed part does not end with the page";
         return false;
     }
-    bytes_.resize(begin_.back());
-    if (bytes_.empty() && frame.empty()) return true;
-    const size_t got = ZSTD_decompressDCtx(threadDecompressor(), bytes_.data(), bytes_.size(),
+    bytes_.resize(begin_.back() + kSlack);
+    if (begin_.back() == 0 && frame.empty()) return true;
+    const size_t got = ZSTD_decompressDCtx(threadDecompressor(), bytes_.data(), begin_.back(),
                                            frame.data(), frame.size());
-    if (ZSTD_isError(got) || got != bytes_.size()) {
+    if (ZSTD_isError(got) || got != begin_.back()) {
         fault = fmt::format("its compressed part is damaged ({})",
                             ZSTD_isError(got) ? ZSTD_getErrorName(got) : "too short");
         return false;

@@ -2,6 +2,8 @@
 // What all page codecs share: the page's header, and the way byte streams are packed into one zstd
 // frame. Internal to src/store.
 
+#include <algorithm>
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
@@ -28,6 +30,17 @@ struct PageHeader {
     uint64_t vertexCount() const;
     uint64_t triangleCount() const;
 };
+
+/// Edge classes of a triangle whose corner `first` becomes corner 0.
+inline uint8_t rotateClasses(uint8_t classes, uint32_t first) {
+    const unsigned low = classes & 63u;
+    return uint8_t((low >> (2 * first) | low << (6 - 2 * first)) & 63u);
+}
+
+inline std::array<int32_t, 2> quantisedNormal(const OctNormal& normal, int bits) {
+    return {quantiseNormal(std::max<int32_t>(normal.x, -32767), bits),
+            quantiseNormal(std::max<int32_t>(normal.y, -32767), bits)};
+}
 
 PageHeader describePage(std::span<const Mesh* const> patches, const PageSettings& settings);
 void writePageHeader(const PageHeader& header, ByteWriter& writer);
@@ -56,12 +69,14 @@ public:
     /// Reads `count` streams; none may be longer than `longest`, the sum no longer than `total`.
     [[nodiscard]] bool read(ByteReader& reader, size_t count, uint64_t longest, uint64_t total,
                             std::string& fault);
+    /// A stream. Some bytes after it may be read too: up to four, with any content.
     std::span<const uint8_t> operator[](size_t stream) const {
         return {bytes_.data() + begin_[stream], begin_[stream + 1] - begin_[stream]};
     }
     size_t size() const { return begin_.size() - 1; }
 
 private:
+    static constexpr size_t kSlack = 4;
     std::vector<uint8_t> bytes_;
     std::vector<size_t> begin_;
 };

@@ -67,11 +67,6 @@ int firstCorner(const Triangle& t, const std::vector<uint32_t>& number) {
     return 0;
 }
 
-uint8_t rotateClasses(uint8_t classes, int first) {
-    const unsigned low = classes & 63u;
-    return uint8_t((low >> (2 * first) | low << (6 - 2 * first)) & 63u);
-}
-
 void orderPatch(const Mesh& mesh, Order& order) {
     const size_t n = mesh.vertexCount(), m = mesh.triangleCount();
     // meshoptimizer does not say which triangle went where, and a triangle may come more than once:
@@ -103,9 +98,9 @@ void orderPatch(const Mesh& mesh, Order& order) {
     std::vector<uint32_t> number(n, ~0u);
     for (size_t i = 0; i < m; ++i) {
         const Triangle t{cached[3 * i], cached[3 * i + 1], cached[3 * i + 2]};
-        const int first = firstCorner(t, number);
+        const auto first = uint32_t(firstCorner(t, number));
         order.edge_class[i] = rotateClasses(classes[i], first);
-        for (int k = 0; k < 3; ++k) {
+        for (uint32_t k = 0; k < 3; ++k) {
             const uint32_t v = t[(first + k) % 3];
             if (number[v] == ~0u) {
                 number[v] = uint32_t(order.vertex.size());
@@ -132,10 +127,6 @@ void writeTriangles(const Order& order, Columns& columns) {
     }
 }
 
-int32_t quantised(int16_t component, int bits) {
-    return quantiseNormal(std::max<int32_t>(component, -32767), bits);
-}
-
 void writeVertices(const PageHeader& header, const PatchHeader& patch, const Mesh& mesh,
                    const Order& order, Columns& columns) {
     std::array<uint32_t, 5> before{};
@@ -147,8 +138,8 @@ void writeVertices(const PageHeader& header, const PatchHeader& patch, const Mes
     for (const uint32_t v : order.vertex) {
         const Vec3i p = (mesh.position[v] >> header.shift) - patch.corner;
         for (int axis = 0; axis < 3; ++axis) put(kX + axis, before[axis], uint32_t(p[axis]));
-        put(kNormalX, before[3], uint32_t(quantised(mesh.normal[v].x, header.normal_bits)));
-        put(kNormalY, before[4], uint32_t(quantised(mesh.normal[v].y, header.normal_bits)));
+        const std::array<int32_t, 2> normal = quantisedNormal(mesh.normal[v], header.normal_bits);
+        for (int k = 0; k < 2; ++k) put(kNormalX + k, before[3 + k], uint32_t(normal[k]));
         size_t a = 0;
         if (header.colours) {
             const Rgba8 c = mesh.colour[v];

@@ -20,11 +20,10 @@ Box3d Scene::bounds() const {
     return box;
 }
 
-size_t Scene::tableBytes() const {
-    size_t bytes = 0;
-    for (const auto& model : models)
-        bytes += model->nodes().size() * sizeof(Node) + model->pageCount() * sizeof(PageInfo);
-    return bytes;
+std::vector<const ModelReader*> Scene::views() const {
+    std::vector<const ModelReader*> all;
+    for (const auto& model : models) all.push_back(model.get());
+    return all;
 }
 
 }  // namespace pietra

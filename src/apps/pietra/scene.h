@@ -17,8 +17,7 @@ struct Scene {
     explicit Scene(const std::vector<std::string>& paths);
     /// Of all models, in input coordinates.
     Box3d bounds() const;
-    /// What the tables in memory take, in bytes.
-    size_t tableBytes() const;
+    std::vector<const ModelReader*> views() const;
 };
 
 /// Of the whole model, in input coordinates.

@@ -41,6 +41,7 @@ public:
 private:
     Cut select(const ModelReader& model) const;
     size_t budgetBytes(const ModelReader& model, size_t in_flight) const;
+    std::string tempDir() const;
 
     std::string file_;
     std::string output_;
@@ -51,6 +52,7 @@ private:
     double pixels_ = 1;
     PictureSize size_;
     Limits limits_;
+    std::string temp_dir_;
 };
 
 VerbText ExtractVerb::text() const {
@@ -85,6 +87,14 @@ void ExtractVerb::declare(OptionSet& options) {
     options.number("--pixels", "T", pixels_, {.min = 0}, "With --camera: tolerance in pixels.");
     options.pictureSize("--size", size_, "With --camera: of the picture, in pixels.");
     limits_.declare(options);
+    options.text("--temp-dir", "DIR", temp_dir_, "Where temporary files go.")
+        .defaultsTo("the folder of the output");
+}
+
+std::string ExtractVerb::tempDir() const {
+    if (!temp_dir_.empty()) return temp_dir_;
+    const size_t slash = output_.rfind('/');
+    return slash == std::string::npos ? "." : output_.substr(0, slash + 1);
 }
 
 Cut ExtractVerb::select(const ModelReader& model) const {
@@ -123,12 +133,11 @@ int ExtractVerb::run(const RunContext& context) {
 
     const auto writer = createMesh(output_, context.common.force, meshOutputOf(model, cut));
     context.progress.setStages(1);
-    context.progress.beginStage("extract", cut.nodes.size());
-    const ExportReport report = exportCut(model, cut, *writer, budget, in_flight, context.progress);
+    context.progress.beginStage("extract", exportSteps(cut));
+    const ExportReport report =
+        exportCut(model, cut, *writer, {tempDir(), in_flight}, budget, context.progress);
     context.progress.endStage();
     for (const std::string& note : writer->notes()) logWarning(note);
-    if (report.repeated)
-        logWarning("memory was short: some vertices between patches are written more than once");
     logInfo(fmt::format("{}: {} triangles, {} vertices, error at most {:.6g}", output_,
                         report.triangles, report.vertices, max_error));
     writeReport(

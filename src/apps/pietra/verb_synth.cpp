@@ -1,14 +1,16 @@
-// pietra synth: meshes of any size for demonstrations, tests and benchmarks.
+// pietra synth: meshes of any size from nothing, or from a small one.
 
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "apps/pietra/json_report.h"
 #include "apps/pietra/logging.h"
 #include "apps/pietra/verbs.h"
 #include "base/error.h"
 #include "base/text.h"
+#include "io/subdivide.h"
 #include "io/synth.h"
 
 namespace pietra {
@@ -22,8 +24,13 @@ public:
     int run(const RunContext& context) override;
 
 private:
-    SynthRequest request_;
-    std::string output_;
+    SynthRequest request() const;
+
+    std::string kind_, input_, output_;
+    std::optional<uint64_t> triangles_;
+    uint64_t seed_ = SynthRequest{}.seed;
+    std::optional<uint64_t> levels_;
+    std::optional<double> displace_;
 };
 
 VerbText SynthVerb::text() const {
@@ -31,47 +38,73 @@ VerbText SynthVerb::text() const {
     for (const SynthKind& kind : synthKinds()) kinds.emplace_back(kind.name, kind.about);
     return {
         "synth",
-        "make a mesh of any size, for trying things out",
+        "make a mesh to try things with",
         {"KIND -o OUT.ply [--triangles N] [--seed S]",
          "subdivide IN -o OUT.ply [--levels N] [--displace A] [--seed S]"},
-        {"Writes a mesh that is a function of its kind, its size and the seed alone. Memory does "
-         "not grow with the size. The ending of the name decides the format: .ply, .obj, .stl or "
-         ".glb."},
-        {{"a statue of ten million triangles", "pietra synth statue -o big.ply --triangles 10M"},
-         {"a scan, made 256 times larger with detail of its own",
-          "pietra synth subdivide scan.ply -o huge.ply --levels 4 --displace 0.2"}},
+        {"Writes a generated mesh of any size, in bounded memory: the same bytes for the same "
+         "options on every machine. The ending of the name decides the format: .ply, .obj, .stl "
+         "or .glb.",
+         "Subdivision turns a scan into one 4^N times as large. Each level displaces its new "
+         "vertices at random by up to --displace of the local edge, so that the large mesh is as "
+         "rough as real scans are; a closed mesh stays closed."},
+        {{"ten million triangles of a statue", "pietra synth statue -o statue.ply --triangles 10M"},
+         {"a dragon of 223 million triangles",
+          "pietra synth subdivide dragon.ply -o dragon4.ply --levels 4 --displace 0.2"}},
         "Kinds",
         kinds};
 }
 
 void SynthVerb::declare(OptionSet& options) {
-    options.file("KIND", request_.kind, "What to make.").require();
-    options.file("IN", request_.input,
-                 "Of `subdivide`: the mesh to refine. Of `earth`: the netCDF file.");
+    std::string kinds;
+    for (const SynthKind& kind : synthKinds())
+        kinds += (kinds.empty() ? "" : ", ") + std::string(kind.name);
+    options.file("KIND", kind_, "What to make.").require();
+    options.file(
+        "IN", input_,
+        "The mesh to subdivide; of earth, a netCDF file of heights, if not the usual one.");
     options.text("-o,--output", "OUT.ply", output_, "The mesh to write.").require();
-    options.count("--triangles", "N", request_.triangles, {.min = 0}, "How many triangles, about.")
-        .defaultsTo("the kind's own");
-    options.count("--seed", "S", request_.seed, {}, "Chooses among shapes of a kind.");
-    options.count("--levels", "N", request_.levels, {.min = 0, .max = 20},
-                  "Of `subdivide`: each level makes four triangles of one.");
-    options.number("--displace", "A", request_.displace, {.min = 0, .max = 1},
-                   "Of `subdivide`: height of the detail, as a part of the local edge.");
+    options.count("--triangles", "N", triangles_, {.min = 1}, "About how many triangles.")
+        .defaultsTo("2M; of earth, all that there are");
+    options.count("--seed", "S", seed_, {}, "Chooses what is random.");
+    options
+        .count("--levels", "N", levels_, {.max = kMaxSubdivideLevels},
+               "How often each triangle is cut into four.")
+        .defaultsTo(std::to_string(SynthRequest{}.levels));
+    options
+        .number("--displace", "A", displace_, {.min = 0, .max = 1},
+                "How far new vertices are displaced, in parts of the local edge.")
+        .defaultsTo(fmt::format("{}", SynthRequest{}.displace));
+}
+
+SynthRequest SynthVerb::request() const {
+    const bool subdivides = kind_ == "subdivide";
+    if (subdivides && triangles_)
+        throw UsageError("--triangles: synth subdivide is told --levels instead");
+    if (!subdivides && levels_) throw UsageError("--levels: goes with synth subdivide only");
+    if (!subdivides && displace_) throw UsageError("--displace: goes with synth subdivide only");
+    if (!input_.empty() && !subdivides && kind_ != "earth")
+        throw UsageError(fmt::format("synth {} takes no input, '{}' was given", kind_, input_));
+    SynthRequest request;
+    request.kind = kind_;
+    request.triangles = triangles_.value_or(0);
+    request.seed = seed_;
+    request.input = input_;
+    if (levels_) request.levels = int(*levels_);
+    request.displace = displace_.value_or(request.displace);
+    return request;
 }
 
 int SynthVerb::run(const RunContext& context) {
     checkOutput(output_, context.common.force);
     context.progress.setStages(1);
     const SynthResult result =
-        synthesize(request_, output_, context.common.force, context.progress);
-    context.progress.endStage();
+        synthesize(request(), output_, context.common.force, context.progress);
     for (const std::string& note : result.notes) logWarning(note);
-    logInfo(fmt::format("{}: {} triangles, {} vertices", output_,
-                        formatCount(double(result.triangles)),
-                        formatCount(double(result.vertices))));
-    writeReport(
-        context.common.report,
-        {{"kind", request_.kind}, {"triangles", result.triangles}, {"vertices", result.vertices}},
-        context.common.force);
+    logInfo(
+        fmt::format("{}: {} triangles, {} vertices", output_, result.triangles, result.vertices));
+    writeReport(context.common.report,
+                {{"kind", kind_}, {"triangles", result.triangles}, {"vertices", result.vertices}},
+                context.common.force);
     return 0;
 }
 

@@ -38,6 +38,9 @@ struct RasterStatistics {
     double totalMs() const { return transform_ms + raster_ms + shade_ms + finish_ms; }
 };
 
+/// Longest side of a picture, in pixels.
+inline constexpr int kMaxPictureSide = 1 << 14;
+
 class Rasteriser {
 public:
     /// `view` must have been made with `lattice`. `samples`: 1 at the pixel's centre, or 4 on the

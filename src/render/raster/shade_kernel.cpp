@@ -1,5 +1,7 @@
 #include "render/raster/shade_kernel.h"
 
+#include "render/shading.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/raster/shade_kernel.cpp"
 #include <hwy/foreach_target.h>
@@ -44,21 +46,18 @@ HWY_INLINE Vec normalized(const Vec& a) {
     return scaled(a, hn::IfThenElseZero(hn::Gt(square, hn::Zero(DF())), inverse));
 }
 
-/// decodeNormal() of octahedral.h; the two numbers are the halves of a lane.
+/// The direction of decodeNormal() of octahedral.h, not of unit length; the two numbers are the
+/// halves of a lane.
 HWY_INLINE Vec decode(VI packed) {
     const DF df;
-    const VF scale = set(32767.0f), one = set(1), zero = hn::Zero(df);
-    VF x = hn::Div(hn::ConvertTo(df, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed))), scale);
-    VF y = hn::Div(hn::ConvertTo(df, hn::ShiftRight<16>(packed)), scale);
+    const VF one = set(32767.0f), zero = hn::Zero(df);
+    const VF x = hn::ConvertTo(df, hn::ShiftRight<16>(hn::ShiftLeft<16>(packed)));
+    const VF y = hn::ConvertTo(df, hn::ShiftRight<16>(packed));
     const VF z = hn::Sub(hn::Sub(one, hn::Abs(x)), hn::Abs(y));
     const MF folded = hn::Lt(z, zero);
-    const VF folded_x =
-        hn::Mul(hn::Sub(one, hn::Abs(y)), hn::IfThenElse(hn::Lt(x, zero), set(-1), one));
-    const VF folded_y =
-        hn::Mul(hn::Sub(one, hn::Abs(x)), hn::IfThenElse(hn::Lt(y, zero), set(-1), one));
-    x = hn::IfThenElse(folded, folded_x, x);
-    y = hn::IfThenElse(folded, folded_y, y);
-    return normalized({x, y, z});
+    const VF folded_x = hn::CopySign(hn::Sub(one, hn::Abs(y)), x);
+    const VF folded_y = hn::CopySign(hn::Sub(one, hn::Abs(x)), y);
+    return {hn::IfThenElse(folded, folded_x, x), hn::IfThenElse(folded, folded_y, y), z};
 }
 
 /// One vector of lanes, from `at` on.
@@ -69,13 +68,11 @@ public:
 
     HWY_INLINE void run() {
         const DI di;
-        const VI pixel_x = hn::Load(di, lanes_.x + at_), pixel_y = hn::Load(di, lanes_.y + at_);
+        const VI place = hn::Load(di, lanes_.place + at_), mask = hn::Set(di, kPlaceMask);
+        const VI pixel_x = hn::And(place, mask);
+        const VI pixel_y = hn::And(hn::ShiftRight<kPlaceBits>(place), mask);
         findWeights(pixel_x, pixel_y);
-        Vec world = scaled(decode(normal_[0]), weight_[0]);
-        for (int k = 1; k < 3; ++k) {
-            const Vec n = scaled(decode(normal_[k]), weight_[k]);
-            world = {hn::Add(world.x, n.x), hn::Add(world.y, n.y), hn::Add(world.z, n.z)};
-        }
+        const Vec world = interpolatedNormal();
         const Vec n =
             normalized({dot(world, view_.right), dot(world, view_.up), dot(world, view_.back)});
         const Vec eye = toEye(pixel_x, pixel_y);
@@ -108,29 +105,48 @@ private:
         back_ = hn::Gt(hn::Add(hn::Add(e[0], e[1]), e[2]), hn::Zero(df));
         for (int k = 0; k < 3; ++k) e[k] = hn::Mul(e[k], inv_depth[k]);
         useGiven(e);
-        // Positive where the pixel's centre is inside, whatever the orientation; else the nearest
-        // point of the triangle, about.
-        const VF inverse = hn::Div(set(1), hn::Add(hn::Add(e[0], e[1]), e[2]));
-        for (int k = 0; k < 3; ++k) e[k] = positive(hn::Mul(e[k], inverse));
+        // Of the sign of their sum where the pixel's centre is inside; else the nearest point of
+        // the triangle, about.
+        const VF direction = hn::Add(hn::Add(e[0], e[1]), e[2]);
+        for (int k = 0; k < 3; ++k) e[k] = positive(hn::Mul(e[k], hn::CopySign(set(1), direction)));
         const VF sum = hn::Add(hn::Add(e[0], e[1]), e[2]);
-        // Not so for a sliver whose area is lost to rounding, where everything is inf or NaN.
-        const MF usable = hn::And(hn::Gt(sum, hn::Zero(df)), hn::Lt(sum, set(1e30f)));
-        const VF normalise = hn::Div(set(1), sum);
+        // Zero for a sliver whose area is lost to rounding.
+        const VF inverse = hn::Div(set(1), sum);
+        const MF usable = hn::Gt(sum, hn::Zero(df));
         for (int k = 0; k < 3; ++k)
-            weight_[k] =
-                hn::IfThenElse(usable, hn::Mul(e[k], normalise), set(k == 0 ? 1.0f : 0.0f));
+            weight_[k] = hn::IfThenElse(usable, hn::Mul(e[k], inverse), set(k == 0 ? 1.0f : 0.0f));
     }
 
     HWY_INLINE void useGiven(VF e[3]) {
         const DI di;
         const DF df;
+        if (HWY_LIKELY(!lanes_.any_given)) return;
         const auto given = hn::RebindMask(df, hn::MaskFromVec(hn::Load(di, lanes_.given + at_)));
-        if (HWY_LIKELY(hn::AllFalse(df, given))) return;
         for (int k = 0; k < 3; ++k)
             e[k] = hn::IfThenElse(given, hn::Load(df, lanes_.given_weight[k] + at_), e[k]);
         const auto back =
             hn::RebindMask(df, hn::MaskFromVec(hn::Load(di, lanes_.given_back + at_)));
         back_ = hn::Or(hn::And(given, back), hn::AndNot(given, back_));
+    }
+
+    /// The weighted sum of the corners' unit normals, of any length: multiplied by all three
+    /// lengths it needs no division.
+    HWY_INLINE Vec interpolatedNormal() const {
+        Vec n[3];
+        VF square[3];
+        for (int k = 0; k < 3; ++k) {
+            n[k] = decode(normal_[k]);
+            square[k] = dot(n[k], n[k]);
+        }
+        Vec sum;
+        for (int k = 0; k < 3; ++k) {
+            const VF lengths = hn::Sqrt(hn::Mul(square[(k + 1) % 3], square[(k + 2) % 3]));
+            const Vec part = scaled(n[k], hn::Mul(weight_[k], lengths));
+            sum = k == 0
+                      ? part
+                      : Vec{hn::Add(sum.x, part.x), hn::Add(sum.y, part.y), hn::Add(sum.z, part.z)};
+        }
+        return sum;
     }
 
     HWY_INLINE Vec toEye(VI pixel_x, VI pixel_y) const {
@@ -144,14 +160,9 @@ private:
     /// A sliver's side may be lost to rounding, and near a silhouette normals point away from faces
     /// that are seen: only both together, or a normal that is clearly wrong, turn it round.
     HWY_INLINE Vec turned(const Vec& n, const Vec& eye) const {
-        const DI di;
-        const DF df;
-        const VF limit = hn::IfThenElse(back_, hn::Zero(df), set(-0.25f));
-        const auto both =
-            hn::RebindMask(df, hn::MaskFromVec(hn::Load(di, lanes_.both_sides + at_)));
-        const MF turn = hn::And(both, hn::Lt(dot(n, eye), limit));
-        const VF sign = hn::IfThenElse(turn, set(-1), set(1));
-        return scaled(n, sign);
+        if (!lanes_.both_sides) return n;
+        const VF limit = hn::IfThenElse(back_, hn::Zero(DF()), set(-0.25f));
+        return scaled(n, hn::IfThenElse(hn::Lt(dot(n, eye), limit), set(-1), set(1)));
     }
 
     HWY_INLINE void store(const Vec& v, float (*out)[kShadeLanes]) const {
@@ -182,6 +193,28 @@ constexpr float kGroundLight[3] = {0.085f, 0.07f, 0.06f};
 constexpr float kEyeLight = 0.10f;
 constexpr float kShine = 0.12f;
 
+HWY_INLINE VI tableIndex(VF linear) {
+    const VF clamped = hn::Min(positive(linear), set(1));
+    return hn::NearestInt(hn::Mul(clamped, set(float(kSrgbEntries - 1))));
+}
+
+void LeaveUnlit(ShadeLanes& lanes) {
+    const DF df;
+    for (int c = 0; c < 3; ++c)
+        for (size_t at = 0; at < size_t(kShadeLanes); at += hn::Lanes(df))
+            hn::Store(tableIndex(hn::Load(df, lanes.base[c] + at)), DI(), lanes.lit[c] + at);
+}
+
+void ShowNormals(ShadeLanes& lanes) {
+    const DF df;
+    const VF half = set(0.5f * float(kSrgbEntries - 1));
+    for (int c = 0; c < 3; ++c)
+        for (size_t at = 0; at < size_t(kShadeLanes); at += hn::Lanes(df)) {
+            const VF n = hn::Load(df, lanes.normal[c] + at);
+            hn::Store(hn::NearestInt(hn::Add(hn::Mul(n, half), half)), DI(), lanes.lit[c] + at);
+        }
+}
+
 void LightLanes(const ShadeView& view, ShadeLanes& lanes) {
     const DF df;
     for (size_t at = 0; at < size_t(kShadeLanes); at += hn::Lanes(df)) {
@@ -205,7 +238,7 @@ void LightLanes(const ShadeView& view, ShadeLanes& lanes) {
             light = hn::Add(light, hn::Mul(sky, set(kSkyLight[c])));
             light = hn::Add(light, hn::Mul(ground, set(kGroundLight[c])));
             const VF diffuse = hn::Mul(light, hn::Load(df, lanes.base[c] + at));
-            hn::Store(hn::Add(diffuse, shine), df, lanes.lit[c] + at);
+            hn::Store(tableIndex(hn::Add(diffuse, shine)), DI(), lanes.lit[c] + at);
         }
     }
 }
@@ -219,6 +252,8 @@ namespace pietra {
 
 HWY_EXPORT(InterpolateLanes);
 HWY_EXPORT(LightLanes);
+HWY_EXPORT(LeaveUnlit);
+HWY_EXPORT(ShowNormals);
 
 void interpolateLanes(const ShadeView& view, ShadeLanes& lanes) {
     HWY_DYNAMIC_DISPATCH(InterpolateLanes)(view, lanes);
@@ -226,6 +261,14 @@ void interpolateLanes(const ShadeView& view, ShadeLanes& lanes) {
 
 void lightLanes(const ShadeView& view, ShadeLanes& lanes) {
     HWY_DYNAMIC_DISPATCH(LightLanes)(view, lanes);
+}
+
+void showNormals(ShadeLanes& lanes) {
+    HWY_DYNAMIC_DISPATCH(ShowNormals)(lanes);
+}
+
+void leaveUnlit(ShadeLanes& lanes) {
+    HWY_DYNAMIC_DISPATCH(LeaveUnlit)(lanes);
 }
 
 }  // namespace pietra

@@ -12,11 +12,15 @@ namespace pietra {
 /// Pixels shaded together, whatever the SIMD level.
 inline constexpr int kShadeLanes = 16;
 
+/// Pictures have at most 2^kPlaceBits columns and rows.
+inline constexpr int kPlaceBits = 14;
+inline constexpr int32_t kPlaceMask = (1 << kPlaceBits) - 1;
+
 struct alignas(64) ShadeLanes {
     // Set by the caller.
     ScreenVertex corner[3][kShadeLanes];
-    int32_t x[kShadeLanes], y[kShadeLanes];  ///< pixel
-    int32_t both_sides[kShadeLanes];         ///< 0 or -1
+    int32_t place[kShadeLanes];  ///< of the pixel: x, y * 2^kPlaceBits, and bits that do not matter
+                                 ///< here
     /// Where `given` is -1 a corner has no image, and perspective-correct weights (of any sum but
     /// 0) and facing are the caller's.
     int32_t given[kShadeLanes], given_back[kShadeLanes];
@@ -28,7 +32,10 @@ struct alignas(64) ShadeLanes {
     // Set by the caller for lightLanes().
     float base[3][kShadeLanes];  ///< surface colour in linear light
     // Set by lightLanes().
-    float lit[3][kShadeLanes];  ///< in linear light
+    int32_t lit[3][kShadeLanes];  ///< entries of srgbTable(), or of plainTable()
+    // Set by the caller; last, as all arrays are aligned.
+    bool both_sides;  ///< of the patch
+    bool any_given;   ///< some lanes of `given` are set
 };
 
 struct ShadeView {
@@ -39,6 +46,10 @@ struct ShadeView {
 };
 
 void interpolateLanes(const ShadeView& view, ShadeLanes& lanes);
+/// `lit` from `base`, by the light or as it is.
 void lightLanes(const ShadeView& view, ShadeLanes& lanes);
+void leaveUnlit(ShadeLanes& lanes);
+/// `lit` from `normal`, components from -1 to 1 over the whole of plainTable().
+void showNormals(ShadeLanes& lanes);
 
 }  // namespace pietra

@@ -1,0 +1,48 @@
+#pragma once
+// The connectivity of any mesh as an oriented manifold with borders. Half-edges a->b and b->a are
+// paired where there is exactly one of each; all others are border. Then every vertex is split into
+// its fans: runs of triangles around it that are joined by paired edges. A fan vertex is interior
+// (its fan closes) or lies on exactly one border loop. Internal to src/store.
+//
+// Half-edge 3t+k of triangle t starts at its corner k. Linear time, deterministic.
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "geometry/mesh.h"
+
+namespace pietra {
+
+inline constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+
+inline uint32_t nextHalfEdge(uint32_t h) {
+    return h % 3 == 2 ? h - 2 : h + 1;
+}
+inline uint32_t previousHalfEdge(uint32_t h) {
+    return h % 3 == 0 ? h + 2 : h - 1;
+}
+
+struct FanMesh {
+    std::vector<uint32_t> opposite;  ///< of a half-edge, or kNone on a border
+    std::vector<uint32_t> corner;    ///< fan vertex from which a half-edge starts
+    std::vector<uint32_t> origin;    ///< the mesh's vertex of a fan vertex
+    std::vector<uint32_t> valence;   ///< triangles around a fan vertex
+    std::vector<uint32_t> border;    ///< the border half-edge that leaves it, or kNone
+
+    /// False if a triangle uses a vertex twice, or no triangle uses some vertex.
+    [[nodiscard]] bool build(const Mesh& mesh);
+
+private:
+    void pairHalfEdges(const Mesh& mesh);
+    void splitIntoFans(const Mesh& mesh);
+
+    std::vector<uint32_t> first_;  // of the half-edges that leave a vertex, in leaving_
+    struct Leaving {
+        uint32_t target;
+        uint32_t half_edge;
+    };
+    std::vector<Leaving> leaving_;
+};
+
+}  // namespace pietra
