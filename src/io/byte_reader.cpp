@@ -9,8 +9,7 @@ namespace pietra {
 
 ByteReader::ByteReader(std::unique_ptr<ByteSource> source)
     : source_(std::move(source)),
-      window_(size_t(std::min<uint64_t>(kWindow, source_->lengthBound()))),
-      buffer_(window_ + kPadding) {}
+      window_(size_t(std::min<uint64_t>(kWindow, source_->lengthBound()))) {}
 
 void ByteReader::seek(uint64_t offset) {
     if (offset >= base_ && offset - base_ <= end_) {
@@ -21,7 +20,14 @@ void ByteReader::seek(uint64_t offset) {
     }
 }
 
+void ByteReader::release() {
+    base_ += cursor_;
+    cursor_ = end_ = 0;
+    std::vector<uint8_t>().swap(buffer_);
+}
+
 void ByteReader::fill() {
+    if (buffer_.empty()) buffer_.resize(window_ + kPadding);
     std::memmove(buffer_.data(), data(), end_ - cursor_);
     base_ += cursor_;
     end_ -= cursor_;

@@ -44,6 +44,7 @@ public:
         }
         starts_[0] = PlyPlace{header_.body_offset, header_.body_line};
         checkCounts();
+        reader_->release();
     }
 
     const AttributeSchema& schema() const override { return vertices_.schema(); }
@@ -55,7 +56,10 @@ public:
     }
     std::vector<std::string> notes() const override;
 
-    void rewindVertices() override { vertices_read_ = 0; }
+    void rewindVertices() override {
+        vertices_read_ = 0;
+        reader_->release();
+    }
     bool readVertices(VertexBatch& batch) override;
     void rewindTriangles() override;
     bool readTriangles(TriangleBatch& batch) override;
@@ -163,6 +167,7 @@ bool PlySource::readVertices(VertexBatch& batch) {
 void PlySource::rewindTriangles() {
     triangles_read_ = face_reader_ = 0;
     in_faces_ = false;
+    reader_->release();
 }
 
 size_t PlySource::elementOf(size_t face_reader) const {

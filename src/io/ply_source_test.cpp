@@ -150,7 +150,7 @@ std::string gzipped(const std::string& text) {
 
 TEST(PlySource, readsPositionsAndTrianglesExactly) {
     const ScratchDirectory dir;
-    const Grid grid{300};  // more vertices and triangles than a batch holds
+    const Grid grid{260};  // more vertices and triangles than a batch holds
     const WholeMesh mesh = readWhole(dir.write("a.ply", plainGrid(grid, PlyBuilder::kLittle)));
     ASSERT_EQ(mesh.vertices.position.size(), grid.vertexCount());
     for (uint64_t v = 0; v < grid.vertexCount(); ++v)
@@ -398,7 +398,7 @@ TEST(PlySource, unrollsStrips) {
 
 TEST(PlySource, streamsCanBeReadInAnyOrderAgain) {
     const ScratchDirectory dir;
-    const Grid grid{300};
+    const Grid grid{260};
     for (const auto encoding : kEncodings) {
         const std::string text = plainGrid(grid, encoding);
         for (const std::string& path :
@@ -438,6 +438,25 @@ TEST(PlySource, joinsFiles) {
     const WholeMesh twice = readWhole(*openSource({b, b}));
     EXPECT_EQ(twice.schema.scalars.size(), 2u);
     EXPECT_EQ(twice.vertices.scalar.size(), 16u);
+}
+
+TEST(PlySource, joinsManyFilesInTheMemoryOfOne) {
+    const ScratchDirectory dir;
+    const std::string path = dir.write("a.ply", plainGrid(Grid{250}, PlyBuilder::kLittle));
+    const std::vector<std::string> paths(40, path);
+    const size_t before = residentBytes();
+    const auto source = openSource(paths);
+    VertexBatch vertices;
+    TriangleBatch triangles;
+    size_t most = residentBytes();
+    uint64_t count = 0;
+    while (source->readVertices(vertices)) most = std::max(most, residentBytes());
+    while (source->readTriangles(triangles)) {
+        most = std::max(most, residentBytes());
+        count += triangles.triangle.size();
+    }
+    EXPECT_EQ(count, 40u * 125000);
+    EXPECT_LT(most, before + (size_t(12) << 20));
 }
 
 const char kVertexHeader[] =

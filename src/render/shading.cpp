@@ -29,9 +29,13 @@ double decodeSrgb(double srgb) {
 
 struct Tables {
     std::array<float, 256> linear;
+    std::array<uint16_t, 256> linear_units;
     std::array<uint8_t, kSrgbEntries> srgb, plain;
     Tables() {
-        for (int i = 0; i < 256; ++i) linear[i] = float(decodeSrgb(i / 255.0));
+        for (int i = 0; i < 256; ++i) {
+            linear[i] = float(decodeSrgb(i / 255.0));
+            linear_units[i] = uint16_t(decodeSrgb(i / 255.0) * kLinearUnits + 0.5);
+        }
         int byte = 0;
         for (int i = 0; i < kSrgbEntries; ++i) {
             while (byte < 255 && double(i) / (kSrgbEntries - 1) > decodeSrgb((byte + 0.5) / 255))
@@ -74,8 +78,8 @@ const uint8_t* srgbTable() {
 const uint8_t* plainTable() {
     return tables().plain.data();
 }
-const float* linearTable() {
-    return tables().linear.data();
+const uint16_t* linearUnitTable() {
+    return tables().linear_units.data();
 }
 
 float linearFromSrgb(float srgb) {
@@ -83,7 +87,7 @@ float linearFromSrgb(float srgb) {
 }
 
 float linearFromSrgb(uint8_t srgb) {
-    return linearTable()[srgb];
+    return tables().linear[srgb];
 }
 
 Vec3f linearFromSrgb(const Rgba8& srgb) {

@@ -58,8 +58,9 @@ inline constexpr int kSrgbEntries = 8192;
 const uint8_t* srgbTable();
 /// As long, for what is no light: entry i is round(i * 255 / (kSrgbEntries - 1)).
 const uint8_t* plainTable();
-/// The 256 entries behind linearFromSrgb of bytes.
-const float* linearTable();
+/// Linear light of the 256 bytes, in units of 1 / kLinearUnits.
+inline constexpr int kLinearUnits = 8 * (kSrgbEntries - 1);
+const uint16_t* linearUnitTable();
 
 /// Colours of the debug views, in linear light; t is clamped to [0, 1].
 Vec3f scalarColour(float t);          ///< dark violet, blue, green, yellow; even in lightness

@@ -11,6 +11,10 @@ namespace {
 constexpr float kFloorPart = 0.5f;
 /// Accepted as it comes: this part of what was verified already.
 constexpr float kAcceptPart = 0.5f;
+/// A height over a face is accepted up to this part of what the step's error will be at least,
+/// whatever the face had before.
+/// (0.3 costs 1 to 5 % of tightness and saves 40 % of the time; 0.5 costs half of the tightness.)
+constexpr float kAcceptHeight = 0.3f;
 /// Verified: whatever is above this part of the largest value verified.
 constexpr float kVerifyPart = 0.9f;
 /// A piece this much above the largest value verified is verified at once, not at the end.
@@ -69,19 +73,19 @@ bool Direction::coverField(uint32_t t, uint32_t start, const Progressing& progre
     if (!field_.run(*source_, t, start)) return false;
     const Vec3f origin = source_->corner(t, 0);
     const float limit = progress.limit();
+    const float height_limit = kAcceptHeight * std::max(progress.floor, progress.verified);
     for (const FieldCover::Hit& hit : field_.hits()) {
         ++counters_.overlaps;
         const float value =
             (base(t) + offset(hit.face) + (hit.height + field_.slack())) * (1 + 0x1p-21f);
-        if (value <= limit) {
+        if (value <= limit || hit.height + field_.slack() <= height_limit) {
             ++counters_.by_height;
             accept(t, hit.face, value);
             continue;
         }
-        const float plane =
-            (base(t) + offset(hit.face) + (field_.overlapHeight(hit) + field_.slack())) *
-            (1 + 0x1p-21f);
-        if (plane <= limit) {
+        const float height = field_.overlapHeight(hit) + field_.slack();
+        const float plane = (base(t) + offset(hit.face) + height) * (1 + 0x1p-21f);
+        if (plane <= limit || height <= height_limit) {
             ++counters_.by_overlap;
             accept(t, hit.face, plane);
             continue;

@@ -81,37 +81,57 @@ void Surface::computeNormals() {
 void Surface::buildBlocks() const {
     if (blocks_valid_) return;
     blocks_valid_ = true;
-    block_.clear();
-    for (uint32_t begin = 0; begin < faceCount(); begin += kBlockFaces) {
-        const uint32_t end = std::min(begin + kBlockFaces, faceCount());
-        Block block{Vec3f(std::numeric_limits<float>::max()),
-                    Vec3f(std::numeric_limits<float>::lowest())};
-        for (uint32_t f = begin; f < end; ++f) {
-            for (int k = 0; k < 3; ++k) {
-                block.min = glm::min(block.min, corner(f, k));
-                block.max = glm::max(block.max, corner(f, k));
-            }
+    constexpr Block kEmpty{Vec3f(std::numeric_limits<float>::max()),
+                           Vec3f(std::numeric_limits<float>::lowest())};
+    const auto blocksOf = [](size_t count) { return (count + kBlockFaces - 1) / kBlockFaces; };
+    size_t levels = 0;
+    for (size_t count = blocksOf(faceCount());; count = blocksOf(count)) {
+        if (blocks_.size() == levels) blocks_.emplace_back();
+        blocks_[levels].assign(count, kEmpty);
+        ++levels;
+        if (count <= kBlockFaces) break;
+    }
+    blocks_.resize(levels);
+    for (uint32_t f = 0; f < faceCount(); ++f) {
+        Block& block = blocks_[0][f / kBlockFaces];
+        for (int k = 0; k < 3; ++k) {
+            block.min = glm::min(block.min, corner(f, k));
+            block.max = glm::max(block.max, corner(f, k));
         }
-        block_.push_back(block);
+    }
+    for (size_t level = 1; level < levels; ++level) {
+        for (size_t b = 0; b < blocks_[level - 1].size(); ++b) {
+            Block& block = blocks_[level][b / kBlockFaces];
+            block.min = glm::min(block.min, blocks_[level - 1][b].min);
+            block.max = glm::max(block.max, blocks_[level - 1][b].max);
+        }
+    }
+}
+
+void Surface::searchBlock(size_t level, uint32_t block, const Vec3f& origin, const Vec3f& p,
+                          std::span<const float> offset, Nearest& best) const {
+    const Block& box = blocks_[level][block];
+    if (squaredDistanceToBox(p, box.min - origin, box.max - origin) >= best.value * best.value) {
+        return;
+    }
+    const uint32_t below = level > 0 ? uint32_t(blocks_[level - 1].size()) : faceCount();
+    const uint32_t end = std::min((block + 1) * kBlockFaces, below);
+    for (uint32_t i = block * kBlockFaces; i < end; ++i) {
+        if (level > 0) {
+            searchBlock(level - 1, i, origin, p, offset, best);
+            continue;
+        }
+        const float value = std::sqrt(squaredDistance(p, local(i, origin))) +
+                            (offset.empty() ? 0.0f : offset[i]);
+        if (value < best.value) best = {i, value};
     }
 }
 
 Surface::Nearest Surface::nearest(const Vec3f& origin, const Vec3f& p,
                                   std::span<const float> offset, Nearest best) const {
     buildBlocks();
-    for (uint32_t b = 0; b < block_.size(); ++b) {
-        const Block& block = block_[b];
-        if (squaredDistanceToBox(p, block.min - origin, block.max - origin) >=
-            best.value * best.value) {
-            continue;
-        }
-        const uint32_t end = std::min((b + 1) * kBlockFaces, faceCount());
-        for (uint32_t f = b * kBlockFaces; f < end; ++f) {
-            const float value = std::sqrt(squaredDistance(p, local(f, origin))) +
-                                (offset.empty() ? 0.0f : offset[f]);
-            if (value < best.value) best = {f, value};
-        }
-    }
+    const size_t top = blocks_.size() - 1;
+    for (uint32_t b = 0; b < blocks_[top].size(); ++b) searchBlock(top, b, origin, p, offset, best);
     return best;
 }
 

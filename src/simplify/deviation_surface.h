@@ -93,7 +93,11 @@ private:
     };
     std::vector<uint32_t> first_link_;  ///< scratch: half-edges listed by their lower vertex
     std::vector<Link> link_;
-    mutable std::vector<Block> block_;  ///< boxes of runs of faces, made when first asked for
+    void searchBlock(size_t level, uint32_t block, const Vec3f& origin, const Vec3f& p,
+                     std::span<const float> offset, Nearest& best) const;
+    /// A tree of boxes, made when first asked for: runs of faces, then runs of boxes. Faces come in
+    /// the order of the curve, so runs are compact.
+    mutable std::vector<std::vector<Block>> blocks_;
     mutable bool blocks_valid_ = false;
 };
 

@@ -443,6 +443,38 @@ class Model(CommandLineTest):
         self.assertEqual(self.run_pietra("compare", "a.png", "none.png").returncode, 4)
 
 
+class Synth(CommandLineTest):
+    def test_every_kind_is_a_mesh_that_can_be_built(self):
+        for kind in ("sphere", "statue", "terrain"):
+            run = self.run_pietra("synth", kind, "-o", f"{kind}.ply", "--triangles", "2k", "--report", "-")
+            self.assertEqual(run.returncode, 0, run.stderr)
+            triangles = json.loads(run.stdout)["triangles"]
+            self.assertTrue(500 <= triangles <= 8000, f"{kind}: {triangles}")
+            self.build(f"{kind}.ply", f"{kind}.pietra")
+        run = self.run_pietra("synth", "subdivide", "sphere.ply", "-o", "more.ply", "--levels", "1",
+                              "--report", "-")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.build("more.ply", "more.pietra")
+
+    def test_the_same_seed_gives_the_same_bytes(self):
+        for name, seed in (("a", "5"), ("b", "5"), ("c", "6")):
+            self.run_pietra("synth", "terrain", "-o", f"{name}.ply", "--triangles", "2k", "--seed", seed)
+        self.assertEqual(self.read("a.ply"), self.read("b.ply"))
+        self.assertNotEqual(self.read("a.ply"), self.read("c.ply"))
+
+    def test_refusals(self):
+        refuse = self.assertRefused
+        refuse(["synth"], 2, "synth: KIND is missing (see pietra synth --help)")
+        run = self.run_pietra("synth", "cube", "-o", "x.ply")
+        self.assertEqual(run.returncode, 2)
+        self.assertRegex(run.stderr, r'^pietra: synth knows no "cube", but sphere, ')
+        refuse(["synth", "subdivide", "-o", "x.ply"], 2, "synth subdivide needs a mesh to subdivide")
+        refuse(["synth", "sphere", "-o", "x.abc"], 2,
+               "x.abc: the name of a mesh ends in .ply, .obj, .stl or .glb")
+        refuse(["synth", "sphere", "-o", "no/x.ply"], 4,
+               "no/x.ply: cannot create: No such file or directory")
+
+
 if __name__ == "__main__":
     PIETRA = os.path.abspath(sys.argv.pop(1))
     unittest.main()

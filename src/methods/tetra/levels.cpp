@@ -73,8 +73,8 @@ public:
     }
 
     LevelCounts run() {
-        // Levels store about 2.5 times the input together: only progress depends on this guess.
-        progress_.beginStage("coarsen", leaves_.triangles * 5 / 2);
+        // Levels store about 3 times the input together: only progress depends on this guess.
+        progress_.beginStage("coarsen", leaves_.triangles * 3);
         for (int level = leaves_.tree->deepestLevel(); level >= 0; --level)
             if (buildLevel(level)) counts_.levels = std::max(counts_.levels, uint32_t(level) + 1);
         return counts_;

@@ -9,6 +9,7 @@
 #include "render/raster/batch.h"
 #include "render/raster/clip.h"
 #include "render/raster/coverage.h"
+#include "render/raster/finish_picture.h"
 #include "render/raster/pixel_shader.h"
 #include "render/raster/resolve.h"
 #include "render/raster/tiling.h"
@@ -48,6 +49,7 @@ struct Rasteriser::State {
     ShadeSettings settings;
     int samples;
     std::vector<VisibilityKey> key;
+    bool key_clean = false;            // all zero
     std::vector<Rgba8> sample_colour;  // with 4 samples; with 1 it is the picture's
     Picture picture;
     Batch batch;
@@ -64,8 +66,7 @@ struct Rasteriser::State {
     std::vector<DrawChunk> makeChunks() const;
     PixelBox boxOf(const DrawChunk& chunk) const;
     void drawChunk(const DrawChunk& chunk, const VisibilityTile& tile) const;
-    void finishRow(int y);
-    Rgba8 averagedColour(size_t pixel, const Vec3f& background) const;
+    void drawTiles(const std::vector<DrawChunk>& chunks);
 };
 
 void Rasteriser::State::begin() {
@@ -75,7 +76,9 @@ void Rasteriser::State::begin() {
     const size_t pixels = picture.pixelCount();
     picture.colour.resize(pixels);
     picture.depth.resize(pixels);
-    key.assign(pixels * size_t(samples), 0);
+    const size_t keys = pixels * size_t(samples);
+    if (key.size() != keys || !key_clean) key.assign(keys, 0);
+    key_clean = false;
     if (samples > 1) sample_colour.resize(pixels * size_t(samples));
     statistics = {};
 }
@@ -175,33 +178,25 @@ void Rasteriser::State::drawChunk(const DrawChunk& chunk, const VisibilityTile& 
     }
 }
 
-Rgba8 Rasteriser::State::averagedColour(size_t pixel, const Vec3f& background) const {
-    const Rgba8* colour = &sample_colour[4 * pixel];
-    Vec3f sum(0, 0, 0);
-    bool same = true;
-    for (int s = 0; s < 4; ++s) {
-        const bool covered = key[4 * pixel + size_t(s)] != 0;
-        same = same && covered && colour[s] == colour[0];
-        sum += covered ? linearFromSrgb(colour[s]) : background;
-    }
-    return same ? colour[0] : srgbFromLinear(sum * 0.25f);
-}
-
-void Rasteriser::State::finishRow(int y) {
-    const Vec3f background = backgroundColour(settings, y, picture.size.height);
-    const Rgba8 background_byte = srgbFromLinear(background);
-    for (int x = 0; x < picture.size.width; ++x) {
-        const size_t pixel = picture.index(x, y);
-        VisibilityKey nearest = 0;
-        for (int s = 0; s < samples; ++s)
-            nearest = std::max(nearest, key[pixel * size_t(samples) + size_t(s)]);
-        picture.depth[pixel] = nearest == 0 ? std::numeric_limits<float>::infinity()
-                                            : 1 / std::bit_cast<float>(uint32_t(nearest >> 32));
-        if (nearest == 0)
-            picture.colour[pixel] = background_byte;
-        else if (samples == 4)
-            picture.colour[pixel] = averagedColour(pixel, background);
-    }
+void Rasteriser::State::drawTiles(const std::vector<DrawChunk>& chunks) {
+    const std::vector<DrawTile> tiles =
+        makeTiles(chunks, screen(), kTilesPerThread * threadCount());
+    const PixelShader shader(view, projection, settings);
+    Rgba8* colour = samples == 1 ? picture.colour.data() : sample_colour.data();
+    std::atomic<int64_t> raster_ns{0}, shade_ns{0};
+    Stopwatch watch;
+    parallelFor(tiles.size(), [&](size_t i) {
+        Stopwatch tile_watch;
+        const VisibilityTile tile{key.data(), picture.size.width, samples, tiles[i].box};
+        for (const uint32_t chunk : tiles[i].chunk) drawChunk(chunks[chunk], tile);
+        raster_ns += int64_t(tile_watch.ms() * 1e6);
+        for (const uint32_t chunk : tiles[i].chunk)
+            resolveChunk(tile, chunks[chunk], shader, colour);
+        shade_ns += int64_t(tile_watch.ms() * 1e6);
+    });
+    const double wall = watch.ms(), busy = double(raster_ns + shade_ns);
+    statistics.raster_ms += busy > 0 ? wall * double(raster_ns) / busy : wall;
+    statistics.shade_ms += busy > 0 ? wall * double(shade_ns) / busy : 0;
 }
 
 Rasteriser::Rasteriser(const View& view, const Lattice& lattice, int samples,
@@ -231,36 +226,18 @@ void Rasteriser::draw(std::span<const DrawPatch> patches) {
     Stopwatch watch;
     s.layOut(patches);
     parallelFor(s.batch.patch.size(), [&](size_t i) { s.transform(s.batch.patch[i]); });
-    s.statistics.transform_ms += watch.ms();
-    const PixelShader shader(s.view, s.projection, s.settings);
     const std::vector<DrawChunk> chunks = s.makeChunks();
-    const std::vector<DrawTile> tiles =
-        makeTiles(chunks, s.screen(), kTilesPerThread * threadCount());
-    Rgba8* colour = s.samples == 1 ? s.picture.colour.data() : s.sample_colour.data();
-    std::atomic<int64_t> raster_ns{0}, shade_ns{0};
-    parallelFor(tiles.size(), [&](size_t i) {
-        Stopwatch tile_watch;
-        const VisibilityTile tile{s.key.data(), s.picture.size.width, s.samples, tiles[i].box};
-        for (const uint32_t chunk : tiles[i].chunk) s.drawChunk(chunks[chunk], tile);
-        raster_ns += int64_t(tile_watch.ms() * 1e6);
-        for (const uint32_t chunk : tiles[i].chunk)
-            resolveChunk(tile, chunks[chunk], shader, colour);
-        shade_ns += int64_t(tile_watch.ms() * 1e6);
-    });
-    const double wall = watch.ms(), busy = double(raster_ns + shade_ns);
-    s.statistics.raster_ms += busy > 0 ? wall * double(raster_ns) / busy : wall;
-    s.statistics.shade_ms += busy > 0 ? wall * double(shade_ns) / busy : 0;
+    s.statistics.transform_ms += watch.ms();
+    s.drawTiles(chunks);
 }
 
 const Picture& Rasteriser::finish() {
     State& s = *state_;
     Stopwatch watch;
-    parallelFor(size_t(s.picture.size.height), [&](size_t y) { s.finishRow(int(y)); });
-    uint64_t covered = 0;
-    for (const float depth : s.picture.depth)
-        covered += depth != std::numeric_limits<float>::infinity();
-    s.statistics.pixels_covered = covered;
+    s.statistics.pixels_covered =
+        finishPicture(s.settings, s.samples, s.key, s.sample_colour, s.picture);
     s.statistics.finish_ms += watch.ms();
+    s.key_clean = true;
     return s.picture;
 }
 
