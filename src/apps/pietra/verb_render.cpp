@@ -15,6 +15,7 @@
 #include "apps/pietra/verbs.h"
 #include "base/budget.h"
 #include "base/error.h"
+#include "multires/standard_views.h"
 #include "base/parallel.h"
 #include "base/text.h"
 #include "render/offline/offline_picture.h"
@@ -226,7 +227,8 @@ int RenderVerb::run(const RunContext& context) {
     if (!output_.ends_with(".png")) throw UsageError(fmt::format("{}: is not named .png", output_));
     checkOutput(output_, context.common.force);
     const Scene scene(files_);
-    const Camera camera = camera_.camera(scene.bounds(), size_);
+    Camera camera = camera_.camera(scene.bounds(), size_);
+    if (!camera_.fileGiven()) camera = movedCloser(camera, scene.balls(), size_);
     context.progress.setStages(1);
     const OfflinePicture drawn = draw(scene, camera, context.progress);
     const size_t resident = peakResidentBytes();
