@@ -16,8 +16,7 @@ constexpr float kMaxReach = 256;
 constexpr float kCornerMargin = 0x1p-14f;
 
 constexpr int kMaxWalk = 12;
-constexpr size_t kMaxHits = 128;
-constexpr int kMaxOpen = 64;
+constexpr int kMaxOpen = 2 * FieldCover::kMaxHits + 4;
 
 const IntLanes4 kFirst3 = {-1, -1, -1, 0};
 
@@ -25,93 +24,102 @@ Vec3f first3(Lanes4 v) {
     return {v[0], v[1], v[2]};
 }
 
-float dot3(const Vec3f& a, Lanes4 b) {
-    return a.x * b[0] + a.y * b[1] + a.z * b[2];
+/// All ones in the lanes whose bit is set.
+IntLanes4 lanesOf(uint32_t bits) {
+    return (IntLanes4{1, 2, 4, 8} & int32_t(bits)) != 0;
 }
 
 }  // namespace
 
 /// A target vertex seen from T.
 struct FieldCover::Seen {
-    Lanes4 at;         ///< barycentric coordinates with respect to the contracted T; height
+    Lanes4 at;         ///< barycentric coordinates with respect to the contracted T; height over T
+    Lanes4 relative;   ///< position relative to T's first corner
     uint32_t outcode;  ///< bit i: beyond the side opposite to corner i
 };
 
-namespace {
+/// How the line from a to b, an edge of a face to its left, crosses the contracted T.
+struct FieldCover::Crossing {
+    bool meets;                          ///< the edge and T have points in common
+    uint32_t right_corner, left_corner;  ///< corners of T that are certainly to the right, left;
+                                         ///< none unless it meets
+    float height;                        ///< largest of the common points; zero unless it meets
 
-using SeenLanes = Lanes4;
-
-/// On which side of the line from a to b the corners of T lie: positive is left; times the length.
-/// Lanes: corners 2, 0, 1, zero. Written so that short edges lose no accuracy.
-struct EdgeSides {
-    Lanes4 along, along_rotated, side;
-    EdgeSides(SeenLanes a, SeenLanes b)
-        : along(b - a),
-          along_rotated(rotate3(along)),
-          side(a * along_rotated - rotate3(a) * along) {}
-    uint32_t negative() const { return signBits(side) & 7; }
-    /// Bit i: corner i is certainly to the right.
-    uint32_t excluded() const {
+    // Everything is computed, whether needed or not: branches here would be taken at random.
+    Crossing(const Seen& a, const Seen& b) {
+        // Sides of T's corners, times the length; lanes: corners 2, 0, 1, zero. Written so that
+        // short edges lose no accuracy.
+        const Lanes4 along = b.at - a.at, along_rotated = rotate3(along);
+        const Lanes4 side = a.at * along_rotated - rotate3(a.at) * along;
+        const uint32_t negative = signBits(side) & 7;
+        meets = uint32_t((a.outcode & b.outcode) == 0) & uint32_t(negative - 1 < 6u);
+        const uint32_t mask = meets ? 7 : 0;
         const Lanes4 margin = kCornerMargin * (absLanes(along) + absLanes(along_rotated));
-        const uint32_t rotated = signBits(side + margin) & 7;
-        return (rotated >> 1 | rotated << 2) & 7;
+        const auto corners = [&](Lanes4 s) {
+            const uint32_t rotated = signBits(s) & mask;
+            return (rotated >> 1 | rotated << 2) & 7;
+        };
+        right_corner = corners(margin + side);
+        left_corner = corners(margin - side);
+        // Where it enters and leaves T.
+        const Lanes4 t = a.at / (a.at - b.at);
+        const Lanes4 enters = maskLanes(kFirst3 & (a.at < 0), t);
+        const Lanes4 leaves = maskLanes(kFirst3 & (b.at < 0), 1.0f - t);
+        const Lanes4 in = a.at + maxOf3(enters) * along;
+        const Lanes4 out = b.at - maxOf3(leaves) * along;
+        const float largest = maxLanes(absLanes(in), absLanes(out))[3];
+        height = meets ? largest : 0.0f;
     }
 };
 
-/// The largest height of the edge from a to b above the contracted T.
-float edgeHeight(SeenLanes a, SeenLanes b) {
-    const Lanes4 t = a / (a - b);
-    const Lanes4 enters = maskLanes(kFirst3 & (a < 0), t);
-    const Lanes4 leaves = maskLanes(kFirst3 & (b < 0), 1.0f - t);
-    const float height = a[3], rise = b[3] - a[3];
-    const float in = height + maxOf3(enters) * rise;
-    const float out = height + (1 - maxOf3(leaves)) * rise;
-    return std::max(std::abs(in), std::abs(out));
-}
-
-}  // namespace
-
 struct FieldCover::Entry {
-    HalfEdge half_edge;  ///< of the face to enter
-    uint32_t excluded;   ///< corners of T beyond it, as the face sees it
+    Seen a, b;           ///< ends of the edge that is entered by, as the face to enter has them
+    HalfEdge half_edge;  ///< of the face
+    uint32_t beyond;     ///< corners of T certainly on the other side of it
     float height;        ///< of the edge
-    Seen a, b;           ///< its ends, as the face has them
 };
+
+FieldCover::FieldCover() : stack_(std::make_unique<Entry[]>(kMaxOpen)) {}
+FieldCover::~FieldCover() = default;
 
 void FieldCover::setTarget(const Surface& target) {
     target_ = &target;
-    visited_.assign(target.faceCount(), 0);
+    visited_.assign(target.faceCount() + 1, 0);  // the last stands for no face
     run_ = 0;
 }
 
-FieldCover::Seen FieldCover::see(uint32_t vertex) {
+inline FieldCover::Seen FieldCover::see(uint32_t vertex) {
     const Lanes4 w = loadLanes(target_->vertex(vertex).xyz0.data()) - chart_.origin;
     extent_ = maxLanes(extent_, absLanes(w));
     const Lanes4 at = chart_.constant + (chart_.x * w[0] + (chart_.y * w[1] + chart_.z * w[2]));
-    return {at, signBits(at) & 7};
+    return {at, w, signBits(at) & 7};
 }
 
 bool FieldCover::makeChart(const Surface& source, uint32_t t) {
     const Surface::Face& face = source.face(t);
     if (!(face.inverse_area > 0)) return false;
-    chart_.origin = loadLanes(source.vertex(face.vertex[0]).xyz0.data());
-    chart_.edge1 = loadLanes(source.vertex(face.vertex[1]).xyz0.data()) - chart_.origin;
-    chart_.edge2 = loadLanes(source.vertex(face.vertex[2]).xyz0.data()) - chart_.origin;
-    chart_.normal = face.normalLanes();
-    const Lanes4 g1 = face.inverse_area * cross3(chart_.edge2, chart_.normal);
-    const Lanes4 g2 = face.inverse_area * cross3(chart_.normal, chart_.edge1);
-    chart_.x = -g1 - g2;
-    chart_.y = g1;
-    chart_.z = g2;
-    Lanes4 rest = chart_.normal;
-    transpose(chart_.x, chart_.y, chart_.z, rest);
-    chart_.constant = Lanes4{1 - kContraction, -kContraction, -kContraction, 0};
+    Chart& c = chart_;
+    c.origin = loadLanes(source.vertex(face.vertex[0]).xyz0.data());
+    c.edge1 = loadLanes(source.vertex(face.vertex[1]).xyz0.data()) - c.origin;
+    c.edge2 = loadLanes(source.vertex(face.vertex[2]).xyz0.data()) - c.origin;
+    const Lanes4 normal = face.normalLanes();
+    c.y = face.inverse_area * cross3(c.edge2, normal);
+    c.z = face.inverse_area * cross3(normal, c.edge1);
+    c.x = -c.y - c.z;
+    Lanes4 rest = normal;
+    transpose(c.x, c.y, c.z, rest);
+    c.constant = Lanes4{1 - kContraction, -kContraction, -kContraction, 0};
+    c.corner_x = kContraction * (c.edge1 + c.edge2);
+    c.corner_y = c.corner_x + (1 - 3 * kContraction) * c.edge1;
+    c.corner_z = c.corner_x + (1 - 3 * kContraction) * c.edge2;
+    rest = normal;
+    transpose(c.corner_x, c.corner_y, c.corner_z, rest);
     return true;
 }
 
 bool FieldCover::run(const Surface& source, uint32_t t, uint32_t start) {
     if (!makeChart(source, t)) return false;
-    hits_.clear();
+    hit_count_ = 0;
     ++run_;
     extent_ = Lanes4{};
     if (!flood(start)) return false;
@@ -132,7 +140,7 @@ bool FieldCover::findStart(uint32_t& at, std::array<Seen, 3>& seen) {
         int out = -1;
         float worst = 0;
         for (int k = 0; k < 3; ++k) {
-            const float centre = sumOf3(EdgeSides(seen[k].at, seen[nextCorner(k)].at).side);
+            const float centre = sumOf3(cross3(seen[k].at, seen[nextCorner(k)].at));
             if (centre < worst) {
                 worst = centre;
                 out = k;
@@ -145,74 +153,68 @@ bool FieldCover::findStart(uint32_t& at, std::array<Seen, 3>& seen) {
     return false;
 }
 
-// The height of the face's plane at those corners of T.
-float FieldCover::cornerHeight(const Surface::Face& face, float cosine, uint32_t corners) const {
-    const Vec3f n = face.normal;
-    const Lanes4 w = loadLanes(target_->vertex(face.vertex[0]).xyz0.data()) - chart_.origin;
-    const float n1 = dot3(n, chart_.edge1), n2 = dot3(n, chart_.edge2);
-    const float h0 = kContraction * (n1 + n2) - dot3(n, w);
-    float height = 0;
-    if (corners & 1) height = std::abs(h0);
-    if (corners & 2) height = std::max(height, std::abs(h0 + (1 - 3 * kContraction) * n1));
-    if (corners & 4) height = std::max(height, std::abs(h0 + (1 - 3 * kContraction) * n2));
-    return height / cosine;
+// `corner`: one of the face's; `corners`: of T within the face, where its plane's height counts.
+inline bool FieldCover::addHit(uint32_t f, const Seen& corner, float height, uint32_t corners) {
+    const Surface::Face& face = target_->face(f);
+    const Vec3f& n = face.normal;
+    const Lanes4 along = chart_.corner_x * n.x + (chart_.corner_y * n.y + chart_.corner_z * n.z);
+    const float level =
+        corner.relative[0] * n.x + (corner.relative[1] * n.y + corner.relative[2] * n.z);
+    const float cosine = along[3];
+    const float at_corners = maxOf3(maskLanes(lanesOf(corners), absLanes(along - level))) / cosine;
+    hits_[hit_count_++] = {f, std::max(height, at_corners), cosine};
+    return cosine > kMinCosine && hit_count_ < kMaxHits;
 }
 
 bool FieldCover::flood(uint32_t start) {
-    Entry stack[kMaxOpen];
-    int open = 0;
-    float height = 0;
-    uint32_t corners = 0;
-    // The edge from a to b of the current face: if T meets it, its heights count, and the neighbour
-    // is to be entered. False: there is none.
-    const auto cross = [&](const Seen& a, const Seen& b, HalfEdge opposite) {
-        if ((a.outcode & b.outcode) != 0) return true;
-        const EdgeSides sides(a.at, b.at);
-        const uint32_t negative = sides.negative();
-        if (negative == 0 || negative == 7) return true;
-        const float edge_height = edgeHeight(a.at, b.at);
-        height = std::max(height, edge_height);
-        corners &= ~sides.excluded();
-        if (!opposite.exists() || open == kMaxOpen) return false;
-        uint32_t& mark = visited_[opposite.face()];
-        if (mark == run_) return true;
-        mark = run_;
-        stack[open++] = {opposite, EdgeSides(b.at, a.at).excluded(), edge_height, b, a};
-        return true;
-    };
-    const auto close = [&](const Surface::Face& face, uint32_t f, float cosine) {
-        if (corners != 0) height = std::max(height, cornerHeight(face, cosine, corners));
-        hits_.push_back({f, height, cosine});
-    };
-    const Vec3f normal = first3(chart_.normal);
-
     std::array<Seen, 3> seen;
     if (!findStart(start, seen)) return false;
-    visited_[start] = run_;
-    corners = 7;
+    Entry* const stack = stack_.get();
+    int open = 0;
+    bool closed = true;  // no edge that T meets is without a neighbour
+    const uint32_t run = run_;
+    uint32_t* const visited = visited_.data();
+    const auto enter = [&](const Crossing& crossing, const Seen& a, const Seen& b,
+                           HalfEdge opposite) {
+        closed &= !crossing.meets | opposite.exists();
+        Entry& entry = stack[open];
+        entry.a = b;
+        entry.b = a;
+        entry.half_edge = opposite;
+        entry.beyond = crossing.left_corner;
+        entry.height = crossing.height;
+        uint32_t& mark = visited[opposite.exists() ? opposite.face() : target_->faceCount()];
+        const bool fresh = crossing.meets & opposite.exists() & (mark != run);
+        mark = crossing.meets ? run : mark;
+        open += fresh;
+    };
+    visited[start] = run;
     const Surface::Face& first = target_->face(start);
-    const float first_cosine = glm::dot(first.normal, normal);
-    if (!(first_cosine > kMinCosine)) return false;
+    float height = 0;
+    uint32_t corners = 7;
     for (int k = 0; k < 3; ++k) {
-        if (!cross(seen[k], seen[nextCorner(k)], first.opposite[k])) return false;
+        const Seen &a = seen[k], &b = seen[nextCorner(k)];
+        const Crossing crossing(a, b);
+        height = std::max(height, crossing.height);
+        corners &= ~crossing.right_corner;
+        enter(crossing, a, b, first.opposite[k]);
     }
-    close(first, start, first_cosine);
-
+    if (!addHit(start, seen[0], height, corners)) return false;
     while (open > 0) {
-        const Entry entry = stack[--open];
-        const uint32_t f = entry.half_edge.face();
+        const Entry& top = stack[--open];  // to be overwritten by what is entered from here
+        const Seen a = top.a, b = top.b;
+        const uint32_t f = top.half_edge.face();
         const Surface::Face& face = target_->face(f);
-        const float cosine = glm::dot(face.normal, normal);
-        if (!(cosine > kMinCosine) || hits_.size() == kMaxHits) return false;
-        const uint32_t k1 = nextCorner(entry.half_edge.edge()), k2 = nextCorner(k1);
+        const uint32_t k1 = nextCorner(top.half_edge.edge()), k2 = nextCorner(k1);
         const Seen c = see(face.vertex[k2]);
-        height = entry.height;
-        corners = 7 & ~entry.excluded;
-        if (!cross(entry.b, c, face.opposite[k1])) return false;
-        if (!cross(c, entry.a, face.opposite[k2])) return false;
-        close(face, f, cosine);
+        const Crossing first_crossing(b, c), second_crossing(c, a);
+        height = std::max(std::max(top.height, first_crossing.height), second_crossing.height);
+        corners = 7 & ~(top.beyond | first_crossing.right_corner | second_crossing.right_corner);
+        enter(first_crossing, b, c, face.opposite[k1]);
+        enter(second_crossing, c, a, face.opposite[k2]);
+        if (!addHit(f, c, height, corners)) return false;
     }
-    return true;
+    return closed;
 }
 
 // Clips the contracted T, whose corners are the unit vectors, by the three edges of the face. A

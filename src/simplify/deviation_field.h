@@ -21,6 +21,8 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "simplify/deviation_partition.h"
@@ -31,12 +33,17 @@ namespace pietra::deviation {
 
 class FieldCover {
 public:
+    static constexpr int kMaxHits = 96;
+
     /// One face of F.
     struct Hit {
         uint32_t face;
         float height;  ///< the largest, over the overlap with T; slack() not included
         float cosine;  ///< between the normals
     };
+
+    FieldCover();
+    ~FieldCover();
 
     /// Before the first run() with this target.
     void setTarget(const Surface& target);
@@ -45,7 +52,7 @@ public:
     /// False: no height field, or too hard to tell; then nothing is known.
     bool run(const Surface& source, uint32_t t, uint32_t start);
 
-    const std::vector<Hit>& hits() const { return hits_; }
+    std::span<const Hit> hits() const { return {hits_.data(), size_t(hit_count_)}; }
     /// To be added to each height.
     float slack() const { return slack_; }
 
@@ -55,22 +62,27 @@ public:
 
 private:
     struct Seen;
+    struct Crossing;
     struct Entry;
     /// The affine map from the target's space to Seen, and what else is known of T.
     struct Chart {
         Lanes4 origin, x, y, z, constant;
-        Lanes4 edge1, edge2, normal;
+        Lanes4 corner_x, corner_y,
+            corner_z;  ///< lane i: of corner i of the contracted T; of the normal
+        Lanes4 edge1, edge2;
     };
     bool makeChart(const Surface& source, uint32_t t);
     bool flood(uint32_t start);
     Seen see(uint32_t vertex);
     bool findStart(uint32_t& face, std::array<Seen, 3>& seen);
-    float cornerHeight(const Surface::Face& face, float cosine, uint32_t corners) const;
+    bool addHit(uint32_t f, const Seen& corner, float height, uint32_t corners);
 
     const Surface* target_ = nullptr;
     Chart chart_;
     Lanes4 extent_;  ///< largest coordinates met, relative to T's first corner
-    std::vector<Hit> hits_;
+    std::array<Hit, kMaxHits> hits_;
+    int hit_count_ = 0;
+    std::unique_ptr<Entry[]> stack_;
     std::vector<uint32_t> visited_;  ///< per target face: the last run that met it
     uint32_t run_ = 0;
     float slack_ = 0;

@@ -47,6 +47,19 @@ float distanceSlack(const Polygon& polygon, const LocalTriangle& triangle) {
     return kDistanceSlack * std::max({extent.x, extent.y, extent.z});
 }
 
+int farthestCorner(const Polygon& polygon, const LocalTriangle& triangle) {
+    int farthest = 0;
+    float max_sq = -1;
+    for (int i = 0; i < polygon.count; ++i) {
+        const float d = squaredDistance(polygon.corner[i], triangle);
+        if (d > max_sq) {
+            max_sq = d;
+            farthest = i;
+        }
+    }
+    return farthest;
+}
+
 float maxCornerDistance(const Polygon& polygon, const LocalTriangle& triangle) {
     float max_sq = 0;
     for (int i = 0; i < polygon.count; ++i) {

@@ -58,7 +58,9 @@ public:
     }
     Vec3f corner(uint32_t f, int k) const { return position(face_[f].vertex[k]); }
     /// Some face at a vertex, kNone if there is none.
-    uint32_t faceAt(uint32_t v) const { return face_at_[v]; }
+    uint32_t faceAt(uint32_t v) const {
+        return first_out_[v] < first_out_[v + 1] ? out_[first_out_[v]].face() : kNone;
+    }
 
     /// The face in coordinates relative to `origin`, a lattice point: exact.
     LocalTriangle local(uint32_t f, const Vec3f& origin) const {
@@ -77,27 +79,30 @@ public:
                     Nearest start) const;
 
 private:
-    struct Block {
-        Vec3f min, max;
+    /// Boxes of four runs of faces or of four groups of such boxes; empty where there are none.
+    struct alignas(16) BoxGroup {
+        std::array<Lanes4, 3> min, max;
+        Lanes4 squaredDistance(const Vec3f& p) const;
     };
+    void listHalfEdges();
+    uint32_t onlyHalfEdge(uint32_t from, uint32_t to) const;
     void linkNeighbours();
     void computeNormals();
-    void buildBlocks() const;
+    void buildTree() const;
+    void search(size_t level, uint32_t group, const Vec3f& at, const Vec3f& origin, const Vec3f& p,
+                std::span<const float> offset, Nearest& best) const;
 
     std::vector<Vertex> vertex_;
     std::vector<Face> face_;
-    std::vector<uint32_t> face_at_;
-    struct Link {
-        uint32_t upper;  ///< the higher vertex
-        HalfEdge half_edge;
-        uint32_t next;
-        bool ascending;
-        bool taken;
-    };
-    std::vector<uint32_t> first_link_;  ///< scratch: half-edges listed by their lower vertex
-    std::vector<Link> link_;
-    mutable std::vector<Block> block_;  ///< boxes of runs of faces, made when first asked for
-    mutable bool blocks_valid_ = false;
+    /// Half-edges that leave vertex v: [first_out_[v], first_out_[v + 1]) of the two lists.
+    static constexpr uint32_t kMatchWidth = 8;
+    std::vector<uint32_t> first_out_;
+    std::vector<uint32_t> out_target_;  ///< where they end; padded by kMatchWidth
+    std::vector<HalfEdge> out_;
+    /// Level 0 over runs of kRun faces, four to a group; each level over the groups of the one
+    /// before.
+    mutable std::vector<std::vector<BoxGroup>> tree_;
+    mutable bool tree_valid_ = false;
 };
 
 }  // namespace pietra::deviation

@@ -60,6 +60,13 @@ inline uint32_t signBits(Lanes4 v) {
 #endif
 }
 
+/// Bit i: the i-th of four numbers is `x`. They need not be aligned.
+inline uint32_t equalLanes(const uint32_t* numbers, uint32_t x) {
+    IntLanes4 v;
+    std::memcpy(&v, numbers, sizeof v);
+    return signBits(Lanes4(v == int32_t(x)));
+}
+
 /// The largest of lanes 0, 1, 2.
 inline float maxOf3(Lanes4 v) {
     const Lanes4 once = rotate3(v);
