@@ -82,7 +82,7 @@ bool Partition::cutAtEdge(Item& item, int edge, const Vec3f& origin) {
     if (!opposite.exists() || uint32_t(edge) == item.from_edge) return false;
     const Vec3f a = target_->position(face.vertex[edge]) - origin;
     const Vec3f b = target_->position(face.vertex[nextCorner(edge)]) - origin;
-    const Vec3f bisector = face.normal + target_->face(opposite.face()).normal;
+    const Vec3f bisector = face.normal() + target_->face(opposite.face()).normal();
     const Vec3f inward = glm::cross(bisector, b - a);
     if (glm::dot(inward, inward) <= 1e-4f * glm::dot(b - a, b - a)) return false;
     Polygon inside, outside;

@@ -19,7 +19,7 @@ void Surface::assign(const Mesh& mesh) {
     vertex_.resize(mesh.position.size());
     for (size_t v = 0; v < vertex_.size(); ++v) {
         const Vec3i& p = mesh.position[v];
-        vertex_[v].xyz0 = {float(p.x), float(p.y), float(p.z), 0};
+        vertex_[v].lanes = {0, float(p.x), float(p.y), float(p.z)};
     }
     face_.resize(mesh.triangle.size());
     for (uint32_t f = 0; f < face_.size(); ++f) {
@@ -93,8 +93,8 @@ void Surface::computeNormals() {
             glm::cross(Vec3d(position(face.vertex[1])) - a, Vec3d(position(face.vertex[2])) - a);
         const double length_sq = glm::dot(n, n);
         const double inverse = length_sq > 0 ? 1 / std::sqrt(length_sq) : 0;
-        face.normal = Vec3f(n * inverse);
-        face.inverse_area = float(inverse);
+        face.area_normal = {float(inverse), float(n.x * inverse), float(n.y * inverse),
+                            float(n.z * inverse)};
     }
 }
 

@@ -33,17 +33,17 @@ inline constexpr uint32_t nextCorner(uint32_t k) {
 class Surface {
 public:
     struct alignas(16) Vertex {
-        std::array<float, 4> xyz0;  ///< lattice coordinates fit a float
+        std::array<float, 4> lanes;  ///< 0, x, y, z: lattice coordinates fit a float
     };
     struct alignas(16) Face {
-        Vec3f normal;            ///< unit; zero where the face has no area
-        float inverse_area = 0;  ///< 1 / (twice the area); zero where it has none
+        /// 1 / (twice the area), unit normal; all zero where the face has no area
+        std::array<float, 4> area_normal;
         std::array<uint32_t, 3> vertex;
         /// What lies across each edge: one that exists runs the other way round, as consistent
         /// winding has it. Missing at borders and where other than two faces meet.
         std::array<HalfEdge, 3> opposite;
 
-        Lanes4 normalLanes() const { return Lanes4{normal.x, normal.y, normal.z, 0}; }
+        Vec3f normal() const { return {area_normal[1], area_normal[2], area_normal[3]}; }
     };
 
     void assign(const Mesh& mesh);
@@ -53,8 +53,8 @@ public:
     const Face& face(uint32_t f) const { return face_[f]; }
     const Vertex& vertex(uint32_t v) const { return vertex_[v]; }
     Vec3f position(uint32_t v) const {
-        const auto& p = vertex_[v].xyz0;
-        return {p[0], p[1], p[2]};
+        const auto& p = vertex_[v].lanes;
+        return {p[1], p[2], p[3]};
     }
     Vec3f corner(uint32_t f, int k) const { return position(face_[f].vertex[k]); }
     /// Some face at a vertex, kNone if there is none.
@@ -65,7 +65,7 @@ public:
     /// The face in coordinates relative to `origin`, a lattice point: exact.
     LocalTriangle local(uint32_t f, const Vec3f& origin) const {
         return {corner(f, 0) - origin, corner(f, 1) - origin, corner(f, 2) - origin,
-                face_[f].normal};
+                face_[f].normal()};
     }
 
     struct Nearest {
