@@ -199,22 +199,12 @@ size_t Partition::bucketOf(const Vec3i& p, int scale) const {
     return size_t(after - buckets_.begin()) - 1;
 }
 
-std::vector<std::byte> Partition::readOwn(const Bucket& bucket) const {
-    std::vector<std::byte> records(bucket.own_count * own_bytes_);
+std::vector<std::byte> Partition::readChunks(const std::vector<Chunk>& chunks, uint64_t count,
+                                             size_t record_bytes) const {
+    std::vector<std::byte> records(count * record_bytes);
     size_t at = 0;
-    for (const Chunk& chunk : bucket.own) {
-        const size_t bytes = chunk.triangles * own_bytes_;
-        records_.read(chunk.position, std::span(records).subspan(at, bytes));
-        at += bytes;
-    }
-    return records;
-}
-
-std::vector<std::byte> Partition::readGhosts(const Bucket& bucket) const {
-    std::vector<std::byte> records(bucket.ghost_count * kGhostRecordBytes);
-    size_t at = 0;
-    for (const Chunk& chunk : bucket.ghost) {
-        const size_t bytes = chunk.triangles * kGhostRecordBytes;
+    for (const Chunk& chunk : chunks) {
+        const size_t bytes = chunk.triangles * record_bytes;
         records_.read(chunk.position, std::span(records).subspan(at, bytes));
         at += bytes;
     }

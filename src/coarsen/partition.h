@@ -53,13 +53,19 @@ public:
     size_t ownRecordBytes() const { return own_bytes_; }
     static constexpr size_t kGhostRecordBytes = 24;
     /// All records of a bucket, concatenated.
-    std::vector<std::byte> readOwn(const Bucket& bucket) const;
-    std::vector<std::byte> readGhosts(const Bucket& bucket) const;
+    std::vector<std::byte> readOwn(const Bucket& bucket) const {
+        return readChunks(bucket.own, bucket.own_count, own_bytes_);
+    }
+    std::vector<std::byte> readGhosts(const Bucket& bucket) const {
+        return readChunks(bucket.ghost, bucket.ghost_count, kGhostRecordBytes);
+    }
     /// Frees all records.
     void clear() { records_.clear(); }
 
 private:
     struct Dealer;
+    std::vector<std::byte> readChunks(const std::vector<Chunk>& chunks, uint64_t count,
+                                      size_t record_bytes) const;
     void divideOversized(const PartitionSettings& settings, Progress& progress);
     size_t own_bytes_;
     Spill records_;

@@ -125,28 +125,37 @@ void Direction::verify(const Piece& piece, Progressing& progress) {
     ++counters_.verified;
     const Vec3f origin = source_->corner(piece.source, 0);
     const float b = piece.base;
-    float lower = 0;
-    Surface::Nearest worst;
     Piece best = piece;
-    for (int i = 0; i < piece.polygon.count; ++i) {
-        const Surface::Nearest near = target_->nearest(origin, piece.polygon.corner[i], offset_,
-                                                       {piece.target, piece.value - b});
-        if (near.value > worst.value || i == 0) worst = near;
-        lower = std::max(lower, b + near.value);
-        if (near.face == best.target) continue;
-        const float value = partition_.value(piece.polygon, origin, b, near.face);
-        if (value < best.value) {
-            best.value = value;
-            best.target = near.face;
+    const auto finish = [&](float lower) {
+        const float slack = distanceSlack(best.polygon, target_->local(best.target, origin));
+        if (best.value > std::max(progress.verifyAbove(), kTightEnough * lower + 2 * slack) &&
+            piece.cuts < kMaxCuts) {
+            return false;
         }
-    }
-    const float slack = distanceSlack(piece.polygon, target_->local(best.target, origin));
-    if (best.value <= std::max(progress.verifyAbove(), kTightEnough * lower + 2 * slack) ||
-        piece.cuts >= kMaxCuts) {
         accept(best.source, best.target, best.value);
         progress.verified = std::max(progress.verified, best.value);
-        return;
+        return true;
+    };
+    // The worst corner first: mostly it settles the matter.
+    const int worst_corner = farthestCorner(piece.polygon, target_->local(piece.target, origin));
+    float lower = 0;
+    Surface::Nearest worst;
+    for (int turn = 0; turn < piece.polygon.count; ++turn) {
+        const int i = turn == 0 ? worst_corner : turn <= worst_corner ? turn - 1 : turn;
+        const Surface::Nearest near = target_->nearest(origin, piece.polygon.corner[i], offset_,
+                                                       {piece.target, piece.value - b});
+        if (near.value > worst.value || turn == 0) worst = near;
+        lower = std::max(lower, b + near.value);
+        if (near.face != best.target) {
+            const float value = partition_.value(piece.polygon, origin, b, near.face);
+            if (value < best.value) {
+                best.value = value;
+                best.target = near.face;
+            }
+        }
+        if (turn == 0 && finish(lower)) return;
     }
+    if (finish(lower)) return;
     parts_.clear();
     partition_.cover(piece.polygon, origin, piece.source, b, worst.face, progress.verifyAbove(),
                      parts_);

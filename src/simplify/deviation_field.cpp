@@ -16,123 +16,133 @@ constexpr float kMaxReach = 256;
 constexpr float kCornerMargin = 0x1p-14f;
 
 constexpr int kMaxWalk = 12;
-constexpr size_t kMaxHits = 128;
-constexpr int kMaxOpen = 64;
 
-const IntLanes4 kFirst3 = {-1, -1, -1, 0};
+/// Bits of lanes 1 to 3.
+constexpr uint32_t kPointBits = 14;
 
-Vec3f first3(Lanes4 v) {
-    return {v[0], v[1], v[2]};
+Vec3f pointOf(Lanes4 v) {
+    return {v[1], v[2], v[3]};
 }
 
-float dot3(const Vec3f& a, Lanes4 b) {
-    return a.x * b[0] + a.y * b[1] + a.z * b[2];
+/// All ones in the lanes whose bit is set.
+IntLanes4 lanesOf(uint32_t bits) {
+    return (IntLanes4{1, 2, 4, 8} & int32_t(bits)) != 0;
 }
 
 }  // namespace
 
-/// A target vertex seen from T.
-struct FieldCover::Seen {
-    Lanes4 at;         ///< barycentric coordinates with respect to the contracted T; height
-    uint32_t outcode;  ///< bit i: beyond the side opposite to corner i
-};
+/// How an edge from a to b, with its face on the left, crosses the contracted T. Everything is
+/// computed, whether needed or not: branches here would go either way at random.
+struct FieldCover::Crossing {
+    uint32_t meets;        ///< 1 if the edge and T have points in common, else 0
+    uint32_t right, left;  ///< if it meets: corners of T that are certainly to the right, left;
+                           ///< bits as the lanes of Chart::corner_x
+    float height;  ///< if it meets: the largest of the common points; else 0
+    float centre;  ///< not negative if T's centre is to the left
 
-namespace {
+    Crossing(Lanes4 a, Lanes4 b) {
+        // Sides of T's corners 2, 0, 1, times the length. Short edges lose no accuracy this way.
+        const Lanes4 along = b - a, along_rotated = rotate(along);
+        const Lanes4 side = a * along_rotated - rotate(a) * along;
+        const uint32_t negative = signBits(side);
+        meets = uint32_t((signBits(a) & signBits(b) & kPointBits) == 0) &
+                uint32_t(negative - 2 <= kPointBits - 4);
+        centre = sumOfPoint(side)[1];
 
-using SeenLanes = Lanes4;
-
-/// On which side of the line from a to b the corners of T lie: positive is left; times the length.
-/// Lanes: corners 2, 0, 1, zero. Written so that short edges lose no accuracy.
-struct EdgeSides {
-    Lanes4 along, along_rotated, side;
-    EdgeSides(SeenLanes a, SeenLanes b)
-        : along(b - a),
-          along_rotated(rotate3(along)),
-          side(a * along_rotated - rotate3(a) * along) {}
-    uint32_t negative() const { return signBits(side) & 7; }
-    /// Bit i: corner i is certainly to the right.
-    uint32_t excluded() const {
+        const uint32_t mask = (0u - meets) & kPointBits;
         const Lanes4 margin = kCornerMargin * (absLanes(along) + absLanes(along_rotated));
-        const uint32_t rotated = signBits(side + margin) & 7;
-        return (rotated >> 1 | rotated << 2) & 7;
+        right = signBits(margin + side) & mask;
+        left = signBits(margin - side) & mask;
+
+        const Lanes4 t = a / (a - b);  // where it crosses the sides
+        const Lanes4 enters = maskLanes(a < 0, t), leaves = maskLanes(b < 0, 1.0f - t);
+        const Lanes4 part = maxOfPoints(enters, leaves);
+        const float in = a[0] + part[0] * along[0], out = b[0] - part[1] * along[0];
+        const IntLanes4 keep = -IntLanes4{int32_t(meets), 0, 0, 0};
+        height = maskLanes(keep, Lanes4{std::max(std::abs(in), std::abs(out)), 0, 0, 0})[0];
     }
 };
 
-/// The largest height of the edge from a to b above the contracted T.
-float edgeHeight(SeenLanes a, SeenLanes b) {
-    const Lanes4 t = a / (a - b);
-    const Lanes4 enters = maskLanes(kFirst3 & (a < 0), t);
-    const Lanes4 leaves = maskLanes(kFirst3 & (b < 0), 1.0f - t);
-    const float height = a[3], rise = b[3] - a[3];
-    const float in = height + maxOf3(enters) * rise;
-    const float out = height + (1 - maxOf3(leaves)) * rise;
-    return std::max(std::abs(in), std::abs(out));
-}
-
-}  // namespace
-
+/// A face still to be looked at, entered across the edge from a to b.
 struct FieldCover::Entry {
-    HalfEdge half_edge;  ///< of the face to enter
-    uint32_t excluded;   ///< corners of T beyond it, as the face sees it
-    float height;        ///< of the edge
-    Seen a, b;           ///< its ends, as the face has them
+    Lanes4 a, b;
+    uint32_t face, edge;
+    uint32_t beyond;  ///< corners of T certainly on the other side of the edge
+    float height;     ///< of the edge
+    float centre;     ///< not negative if T's centre is on the face's side
 };
+
+FieldCover::FieldCover() : queue_(std::make_unique<Entry[]>(2 * kMaxHits + 4)) {}
+FieldCover::~FieldCover() = default;
 
 void FieldCover::setTarget(const Surface& target) {
     target_ = &target;
-    visited_.assign(target.faceCount(), 0);
+    visited_.assign(target.faceCount() + 1, 0);
     run_ = 0;
-}
-
-FieldCover::Seen FieldCover::see(uint32_t vertex) {
-    const Lanes4 w = loadLanes(target_->vertex(vertex).xyz0.data()) - chart_.origin;
-    extent_ = maxLanes(extent_, absLanes(w));
-    const Lanes4 at = chart_.constant + (chart_.x * w[0] + (chart_.y * w[1] + chart_.z * w[2]));
-    return {at, signBits(at) & 7};
 }
 
 bool FieldCover::makeChart(const Surface& source, uint32_t t) {
     const Surface::Face& face = source.face(t);
-    if (!(face.inverse_area > 0)) return false;
-    chart_.origin = loadLanes(source.vertex(face.vertex[0]).xyz0.data());
-    chart_.edge1 = loadLanes(source.vertex(face.vertex[1]).xyz0.data()) - chart_.origin;
-    chart_.edge2 = loadLanes(source.vertex(face.vertex[2]).xyz0.data()) - chart_.origin;
-    chart_.normal = face.normalLanes();
-    const Lanes4 g1 = face.inverse_area * cross3(chart_.edge2, chart_.normal);
-    const Lanes4 g2 = face.inverse_area * cross3(chart_.normal, chart_.edge1);
-    chart_.x = -g1 - g2;
-    chart_.y = g1;
-    chart_.z = g2;
-    Lanes4 rest = chart_.normal;
-    transpose(chart_.x, chart_.y, chart_.z, rest);
-    chart_.constant = Lanes4{1 - kContraction, -kContraction, -kContraction, 0};
+    const Lanes4 normal = loadLanes(face.area_normal.data());
+    if (!(normal[0] > 0)) return false;
+    Chart& c = chart_;
+    c.origin = loadLanes(source.vertex(face.vertex[0]).lanes.data());
+    c.edge1 = loadLanes(source.vertex(face.vertex[1]).lanes.data()) - c.origin;
+    c.edge2 = loadLanes(source.vertex(face.vertex[2]).lanes.data()) - c.origin;
+    // Rows: the normal and the gradients of the coordinates; then columns.
+    const Lanes4 inverse_area = broadcast<0>(normal);
+    Lanes4 nothing = normal;
+    c.y = inverse_area * crossPoints(c.edge2, normal);
+    c.z = inverse_area * crossPoints(normal, c.edge1);
+    c.x = -c.y - c.z;
+    transpose(nothing, c.x, c.y, c.z);
+    c.constant = Lanes4{0, 1 - kContraction, -kContraction, -kContraction};
+    nothing = normal;
+    c.corner_y = kContraction * (c.edge1 + c.edge2);
+    c.corner_z = c.corner_y + (1 - 3 * kContraction) * c.edge1;
+    c.corner_x = c.corner_y + (1 - 3 * kContraction) * c.edge2;
+    transpose(nothing, c.corner_x, c.corner_y, c.corner_z);
     return true;
+}
+
+inline Lanes4 FieldCover::relative(uint32_t vertex) const {
+    return loadLanes(target_->vertex(vertex).lanes.data()) - chart_.origin;
+}
+
+inline Lanes4 FieldCover::see(Lanes4 w) const {
+    return chart_.constant +
+           (chart_.x * broadcast<1>(w) + (chart_.y * broadcast<2>(w) + chart_.z * broadcast<3>(w)));
 }
 
 bool FieldCover::run(const Surface& source, uint32_t t, uint32_t start) {
     if (!makeChart(source, t)) return false;
-    hits_.clear();
-    ++run_;
-    extent_ = Lanes4{};
-    if (!flood(start)) return false;
-    const Lanes4 gradient = maskLanes(
-        kFirst3, maxLanes(maxLanes(absLanes(chart_.x), absLanes(chart_.y)), absLanes(chart_.z)));
-    const float largest = maxOf3(extent_);
-    const float reach = largest * maxOf3(gradient);
-    if (!(reach <= kMaxReach)) return false;
-    const float size = maxOf3(maxLanes(absLanes(chart_.edge1), absLanes(chart_.edge2)));
-    slack_ = kDistanceSlack * largest + 4 * size * (kContraction + 0x1p-19f * reach);
-    return true;
+    bool centre_met = false;
+    if (!flood(start, centre_met)) return false;
+    if (centre_met) return true;
+    return findStart(start) && flood(start, centre_met) && centre_met;
 }
 
-bool FieldCover::findStart(uint32_t& at, std::array<Seen, 3>& seen) {
+float FieldCover::slackOf(Lanes4 extent) const {
+    const Lanes4 gradient =
+        maxLanes(maxLanes(absLanes(chart_.x), absLanes(chart_.y)), absLanes(chart_.z));
+    const Lanes4 size = maxLanes(absLanes(chart_.edge1), absLanes(chart_.edge2));
+    const Lanes4 extent_gradient = maxOfPoints(extent, gradient);
+    const float reach = extent_gradient[0] * extent_gradient[1];
+    if (!(reach <= kMaxReach)) return -1;
+    return kDistanceSlack * extent_gradient[0] +
+           4 * maxOfPoint(size)[1] * (kContraction + 0x1p-19f * reach);
+}
+
+/// Walks towards T's centre.
+bool FieldCover::findStart(uint32_t& at) const {
     for (int step = 0; step < kMaxWalk; ++step) {
         const Surface::Face& face = target_->face(at);
-        for (int k = 0; k < 3; ++k) seen[k] = see(face.vertex[k]);
+        std::array<Lanes4, 3> seen;
+        for (int k = 0; k < 3; ++k) seen[k] = see(relative(face.vertex[k]));
         int out = -1;
         float worst = 0;
         for (int k = 0; k < 3; ++k) {
-            const float centre = sumOf3(EdgeSides(seen[k].at, seen[nextCorner(k)].at).side);
+            const float centre = sumOfPoint(crossPoints(seen[k], seen[nextCorner(k)]))[1];
             if (centre < worst) {
                 worst = centre;
                 out = k;
@@ -145,88 +155,86 @@ bool FieldCover::findStart(uint32_t& at, std::array<Seen, 3>& seen) {
     return false;
 }
 
-// The height of the face's plane at those corners of T.
-float FieldCover::cornerHeight(const Surface::Face& face, float cosine, uint32_t corners) const {
-    const Vec3f n = face.normal;
-    const Lanes4 w = loadLanes(target_->vertex(face.vertex[0]).xyz0.data()) - chart_.origin;
-    const float n1 = dot3(n, chart_.edge1), n2 = dot3(n, chart_.edge2);
-    const float h0 = kContraction * (n1 + n2) - dot3(n, w);
-    float height = 0;
-    if (corners & 1) height = std::abs(h0);
-    if (corners & 2) height = std::max(height, std::abs(h0 + (1 - 3 * kContraction) * n1));
-    if (corners & 4) height = std::max(height, std::abs(h0 + (1 - 3 * kContraction) * n2));
-    return height / cosine;
+// `corner`: one of the face's, relative; `corners`: of T within the face, where its plane counts.
+inline void FieldCover::addHit(uint32_t f, Lanes4 corner, float height, uint32_t corners) {
+    const Lanes4 normal = loadLanes(target_->face(f).area_normal.data());
+    const Lanes4 along =
+        chart_.corner_x * broadcast<1>(normal) +
+        (chart_.corner_y * broadcast<2>(normal) + chart_.corner_z * broadcast<3>(normal));
+    const Lanes4 level = broadcast<1>(sumOfPoint(corner * normal));
+    const Lanes4 above = maskLanes(lanesOf(corners), absLanes(along - level));
+    const float cosine = along[0];
+    hits_[hit_count_++] = {f, std::max(height, maxOfPoint(above)[1] / cosine), cosine};
 }
 
-bool FieldCover::flood(uint32_t start) {
-    Entry stack[kMaxOpen];
-    int open = 0;
-    float height = 0;
-    uint32_t corners = 0;
-    // The edge from a to b of the current face: if T meets it, its heights count, and the neighbour
-    // is to be entered. False: there is none.
-    const auto cross = [&](const Seen& a, const Seen& b, HalfEdge opposite) {
-        if ((a.outcode & b.outcode) != 0) return true;
-        const EdgeSides sides(a.at, b.at);
-        const uint32_t negative = sides.negative();
-        if (negative == 0 || negative == 7) return true;
-        const float edge_height = edgeHeight(a.at, b.at);
-        height = std::max(height, edge_height);
-        corners &= ~sides.excluded();
-        if (!opposite.exists() || open == kMaxOpen) return false;
-        uint32_t& mark = visited_[opposite.face()];
-        if (mark == run_) return true;
-        mark = run_;
-        stack[open++] = {opposite, EdgeSides(b.at, a.at).excluded(), edge_height, b, a};
-        return true;
-    };
-    const auto close = [&](const Surface::Face& face, uint32_t f, float cosine) {
-        if (corners != 0) height = std::max(height, cornerHeight(face, cosine, corners));
-        hits_.push_back({f, height, cosine});
-    };
-    const Vec3f normal = first3(chart_.normal);
+// If T meets the edge from a to b, the face across it is queued.
+inline void FieldCover::enter(const Crossing& crossing, Lanes4 a, Lanes4 b, HalfEdge opposite) {
+    const uint32_t face = std::min(opposite.face(), target_->faceCount());
+    Entry& entry = queue_[queued_];
+    entry.a = b;
+    entry.b = a;
+    entry.face = face;
+    entry.edge = opposite.edge();
+    entry.beyond = crossing.left;
+    entry.height = crossing.height;
+    entry.centre = -crossing.centre;
+    uint32_t& mark = visited_[face];
+    queued_ += crossing.meets & uint32_t(mark != run_);
+    mark = crossing.meets ? run_ : mark;
+}
 
-    std::array<Seen, 3> seen;
-    if (!findStart(start, seen)) return false;
-    visited_[start] = run_;
-    corners = 7;
+bool FieldCover::flood(uint32_t start, bool& centre_met) {
+    ++run_;
+    hit_count_ = queued_ = 0;
+    // The first face is entered by its own first edge, whose other side is queued if T meets it.
     const Surface::Face& first = target_->face(start);
-    const float first_cosine = glm::dot(first.normal, normal);
-    if (!(first_cosine > kMinCosine)) return false;
-    for (int k = 0; k < 3; ++k) {
-        if (!cross(seen[k], seen[nextCorner(k)], first.opposite[k])) return false;
-    }
-    close(first, start, first_cosine);
+    const Lanes4 w0 = relative(first.vertex[0]), w1 = relative(first.vertex[1]);
+    const Lanes4 first_a = see(w0), first_b = see(w1);
+    const Crossing first_edge(first_a, first_b);
+    Lanes4 extent = maxLanes(absLanes(w0), absLanes(w1));
+    visited_[start] = run_;
+    Entry& own = queue_[queued_++];
+    own.a = first_a;
+    own.b = first_b;
+    own.face = start;
+    own.edge = 0;
+    own.beyond = first_edge.right;
+    own.height = first_edge.height;
+    own.centre = first_edge.centre;
+    enter(first_edge, first_a, first_b, first.opposite[0]);
 
-    while (open > 0) {
-        const Entry entry = stack[--open];
-        const uint32_t f = entry.half_edge.face();
+    // First in, first out: so the processor can begin with the next while this one is being
+    // decided.
+    for (uint32_t next = 0; next < queued_; ++next) {
+        const Entry& entry = queue_[next];
+        const uint32_t f = entry.face;
+        if (f == target_->faceCount() || hit_count_ == kMaxHits) return false;
         const Surface::Face& face = target_->face(f);
-        const float cosine = glm::dot(face.normal, normal);
-        if (!(cosine > kMinCosine) || hits_.size() == kMaxHits) return false;
-        const uint32_t k1 = nextCorner(entry.half_edge.edge()), k2 = nextCorner(k1);
-        const Seen c = see(face.vertex[k2]);
-        height = entry.height;
-        corners = 7 & ~entry.excluded;
-        if (!cross(entry.b, c, face.opposite[k1])) return false;
-        if (!cross(c, entry.a, face.opposite[k2])) return false;
-        close(face, f, cosine);
+        const uint32_t k1 = nextCorner(entry.edge), k2 = nextCorner(k1);
+        const Lanes4 w = relative(face.vertex[k2]);
+        extent = maxLanes(extent, absLanes(w));
+        const Lanes4 c = see(w);
+        const Crossing leave1(entry.b, c), leave2(c, entry.a);
+        const float height = std::max(std::max(entry.height, leave1.height), leave2.height);
+        const uint32_t corners = kPointBits & ~(entry.beyond | leave1.right | leave2.right);
+        addHit(f, w, height, corners);
+        if (!(hits_[hit_count_ - 1].cosine > kMinCosine)) return false;
+        centre_met |= std::min(std::min(entry.centre, leave1.centre), leave2.centre) >= 0;
+        enter(leave1, entry.b, c, face.opposite[k1]);
+        enter(leave2, c, entry.a, face.opposite[k2]);
     }
-    return true;
+    slack_ = slackOf(extent);
+    return slack_ >= 0;
 }
 
 // Clips the contracted T, whose corners are the unit vectors, by the three edges of the face. A
 // margin keeps what rounding might lose.
 bool FieldCover::overlap(uint32_t face, Polygon& polygon) const {
     Polygon now{3, {Vec3f(1, 0, 0), Vec3f(0, 1, 0), Vec3f(0, 0, 1)}};
+    const auto& vertex = target_->face(face).vertex;
     for (int k = 0; k < 3; ++k) {
-        const auto seen = [&](uint32_t v) {
-            const Lanes4 w = loadLanes(target_->vertex(v).xyz0.data()) - chart_.origin;
-            return first3(chart_.constant +
-                          (chart_.x * w[0] + (chart_.y * w[1] + chart_.z * w[2])));
-        };
-        const Vec3f from = seen(target_->face(face).vertex[k]);
-        const Vec3f along = seen(target_->face(face).vertex[nextCorner(k)]) - from;
+        const Vec3f from = pointOf(see(relative(vertex[k])));
+        const Vec3f along = pointOf(see(relative(vertex[nextCorner(k)]))) - from;
         const Vec3f side = glm::cross(from, along);
         const auto largest = [](const Vec3f& v) {
             return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
@@ -245,7 +253,7 @@ bool FieldCover::overlap(uint32_t face, Polygon& polygon) const {
         }
         now = next;
     }
-    const Vec3f e1 = first3(chart_.edge1), e2 = first3(chart_.edge2);
+    const Vec3f e1 = pointOf(chart_.edge1), e2 = pointOf(chart_.edge2);
     polygon.count = 0;
     for (int i = 0; i < now.count; ++i) {
         const Vec3f& c = now.corner[i];

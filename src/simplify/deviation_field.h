@@ -21,6 +21,8 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "simplify/deviation_partition.h"
@@ -31,12 +33,17 @@ namespace pietra::deviation {
 
 class FieldCover {
 public:
+    static constexpr uint32_t kMaxHits = 96;
+
     /// One face of F.
     struct Hit {
         uint32_t face;
         float height;  ///< the largest, over the overlap with T; slack() not included
         float cosine;  ///< between the normals
     };
+
+    FieldCover();
+    ~FieldCover();
 
     /// Before the first run() with this target.
     void setTarget(const Surface& target);
@@ -45,7 +52,7 @@ public:
     /// False: no height field, or too hard to tell; then nothing is known.
     bool run(const Surface& source, uint32_t t, uint32_t start);
 
-    const std::vector<Hit>& hits() const { return hits_; }
+    std::span<const Hit> hits() const { return {hits_.data(), hit_count_}; }
     /// To be added to each height.
     float slack() const { return slack_; }
 
@@ -54,24 +61,33 @@ public:
     bool overlap(uint32_t face, Polygon& polygon) const;
 
 private:
-    struct Seen;
+    struct Crossing;
     struct Entry;
-    /// The affine map from the target's space to Seen, and what else is known of T.
+    /// What is known of T. A target point is *seen* as lanes (height over T's plane, barycentric
+    /// coordinates 0, 1, 2 with respect to the contracted T): an affine map.
     struct Chart {
-        Lanes4 origin, x, y, z, constant;
-        Lanes4 edge1, edge2, normal;
+        Lanes4 origin;                        ///< T's first corner
+        Lanes4 edge1, edge2;                  ///< the others, relative to it
+        Lanes4 constant, x, y, z;             ///< of the map
+        Lanes4 corner_x, corner_y, corner_z;  ///< lanes: T's normal; corners 2, 0, 1 of the
+                                              ///< contracted T, relative to the origin
     };
     bool makeChart(const Surface& source, uint32_t t);
-    bool flood(uint32_t start);
-    Seen see(uint32_t vertex);
-    bool findStart(uint32_t& face, std::array<Seen, 3>& seen);
-    float cornerHeight(const Surface::Face& face, float cosine, uint32_t corners) const;
+    Lanes4 relative(uint32_t vertex) const;
+    Lanes4 see(Lanes4 relative) const;
+    bool findStart(uint32_t& face) const;
+    bool flood(uint32_t start, bool& centre_met);
+    void enter(const Crossing& crossing, Lanes4 a, Lanes4 b, HalfEdge opposite);
+    void addHit(uint32_t f, Lanes4 corner, float height, uint32_t corners);
+    float slackOf(Lanes4 extent) const;
 
     const Surface* target_ = nullptr;
     Chart chart_;
-    Lanes4 extent_;  ///< largest coordinates met, relative to T's first corner
-    std::vector<Hit> hits_;
-    std::vector<uint32_t> visited_;  ///< per target face: the last run that met it
+    std::array<Hit, kMaxHits> hits_;
+    uint32_t hit_count_ = 0;
+    std::unique_ptr<Entry[]> queue_;
+    uint32_t queued_ = 0;
+    std::vector<uint32_t> visited_;  ///< per target face, and for none: the last run that met it
     uint32_t run_ = 0;
     float slack_ = 0;
 };

@@ -47,6 +47,19 @@ float distanceSlack(const Polygon& polygon, const LocalTriangle& triangle) {
     return kDistanceSlack * std::max({extent.x, extent.y, extent.z});
 }
 
+int farthestCorner(const Polygon& polygon, const LocalTriangle& triangle) {
+    int farthest = 0;
+    float max_sq = -1;
+    for (int i = 0; i < polygon.count; ++i) {
+        const float d = squaredDistance(polygon.corner[i], triangle);
+        if (d > max_sq) {
+            max_sq = d;
+            farthest = i;
+        }
+    }
+    return farthest;
+}
+
 float maxCornerDistance(const Polygon& polygon, const LocalTriangle& triangle) {
     float max_sq = 0;
     for (int i = 0; i < polygon.count; ++i) {
@@ -69,7 +82,7 @@ bool Partition::cutAtEdge(Item& item, int edge, const Vec3f& origin) {
     if (!opposite.exists() || uint32_t(edge) == item.from_edge) return false;
     const Vec3f a = target_->position(face.vertex[edge]) - origin;
     const Vec3f b = target_->position(face.vertex[nextCorner(edge)]) - origin;
-    const Vec3f bisector = face.normal + target_->face(opposite.face()).normal;
+    const Vec3f bisector = face.normal() + target_->face(opposite.face()).normal();
     const Vec3f inward = glm::cross(bisector, b - a);
     if (glm::dot(inward, inward) <= 1e-4f * glm::dot(b - a, b - a)) return false;
     Polygon inside, outside;

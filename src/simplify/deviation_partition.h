@@ -31,6 +31,9 @@ bool splitPolygon(const Polygon& polygon, const Vec3f& point, const Vec3f& norma
 /// What rounding may add to a distance between the two.
 float distanceSlack(const Polygon& polygon, const LocalTriangle& triangle);
 
+/// The corner that is farthest from the triangle.
+int farthestCorner(const Polygon& polygon, const LocalTriangle& triangle);
+
 /// Largest distance of a corner to the triangle, slack for rounding included.
 float maxCornerDistance(const Polygon& polygon, const LocalTriangle& triangle);
 

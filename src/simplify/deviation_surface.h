@@ -33,17 +33,17 @@ inline constexpr uint32_t nextCorner(uint32_t k) {
 class Surface {
 public:
     struct alignas(16) Vertex {
-        std::array<float, 4> xyz0;  ///< lattice coordinates fit a float
+        std::array<float, 4> lanes;  ///< 0, x, y, z: lattice coordinates fit a float
     };
     struct alignas(16) Face {
-        Vec3f normal;            ///< unit; zero where the face has no area
-        float inverse_area = 0;  ///< 1 / (twice the area); zero where it has none
+        /// 1 / (twice the area), unit normal; all zero where the face has no area
+        std::array<float, 4> area_normal;
         std::array<uint32_t, 3> vertex;
         /// What lies across each edge: one that exists runs the other way round, as consistent
         /// winding has it. Missing at borders and where other than two faces meet.
         std::array<HalfEdge, 3> opposite;
 
-        Lanes4 normalLanes() const { return Lanes4{normal.x, normal.y, normal.z, 0}; }
+        Vec3f normal() const { return {area_normal[1], area_normal[2], area_normal[3]}; }
     };
 
     void assign(const Mesh& mesh);
@@ -53,17 +53,19 @@ public:
     const Face& face(uint32_t f) const { return face_[f]; }
     const Vertex& vertex(uint32_t v) const { return vertex_[v]; }
     Vec3f position(uint32_t v) const {
-        const auto& p = vertex_[v].xyz0;
-        return {p[0], p[1], p[2]};
+        const auto& p = vertex_[v].lanes;
+        return {p[1], p[2], p[3]};
     }
     Vec3f corner(uint32_t f, int k) const { return position(face_[f].vertex[k]); }
     /// Some face at a vertex, kNone if there is none.
-    uint32_t faceAt(uint32_t v) const { return face_at_[v]; }
+    uint32_t faceAt(uint32_t v) const {
+        return first_out_[v] < first_out_[v + 1] ? out_[first_out_[v]].face() : kNone;
+    }
 
     /// The face in coordinates relative to `origin`, a lattice point: exact.
     LocalTriangle local(uint32_t f, const Vec3f& origin) const {
         return {corner(f, 0) - origin, corner(f, 1) - origin, corner(f, 2) - origin,
-                face_[f].normal};
+                face_[f].normal()};
     }
 
     struct Nearest {
@@ -77,31 +79,30 @@ public:
                     Nearest start) const;
 
 private:
-    struct Block {
-        Vec3f min, max;
+    /// Boxes of four runs of faces or of four groups of such boxes; empty where there are none.
+    struct alignas(16) BoxGroup {
+        std::array<Lanes4, 3> min, max;
+        Lanes4 squaredDistance(const Vec3f& p) const;
     };
+    void listHalfEdges();
+    uint32_t onlyHalfEdge(uint32_t from, uint32_t to) const;
     void linkNeighbours();
     void computeNormals();
-    void buildBlocks() const;
+    void buildTree() const;
+    void search(size_t level, uint32_t group, const Vec3f& at, const Vec3f& origin, const Vec3f& p,
+                std::span<const float> offset, Nearest& best) const;
 
     std::vector<Vertex> vertex_;
     std::vector<Face> face_;
-    std::vector<uint32_t> face_at_;
-    struct Link {
-        uint32_t upper;  ///< the higher vertex
-        HalfEdge half_edge;
-        uint32_t next;
-        bool ascending;
-        bool taken;
-    };
-    std::vector<uint32_t> first_link_;  ///< scratch: half-edges listed by their lower vertex
-    std::vector<Link> link_;
-    void searchBlock(size_t level, uint32_t block, const Vec3f& origin, const Vec3f& p,
-                     std::span<const float> offset, Nearest& best) const;
-    /// A tree of boxes, made when first asked for: runs of faces, then runs of boxes. Faces come in
-    /// the order of the curve, so runs are compact.
-    mutable std::vector<std::vector<Block>> blocks_;
-    mutable bool blocks_valid_ = false;
+    /// Half-edges that leave vertex v: [first_out_[v], first_out_[v + 1]) of the two lists.
+    static constexpr uint32_t kMatchWidth = 8;
+    std::vector<uint32_t> first_out_;
+    std::vector<uint32_t> out_target_;  ///< where they end; padded by kMatchWidth
+    std::vector<HalfEdge> out_;
+    /// Level 0 over runs of kRun faces, four to a group; each level over the groups of the one
+    /// before.
+    mutable std::vector<std::vector<BoxGroup>> tree_;
+    mutable bool tree_valid_ = false;
 };
 
 }  // namespace pietra::deviation

@@ -3,6 +3,8 @@
 // vector extension of g++ and clang, not with Highway: it needs four lanes on the plain baseline,
 // where Highway 1.0 has only its scalar target, and no dispatch. Plain IEEE operations: the same
 // bits everywhere.
+//
+// Points of space sit in lanes 1 to 3; lane 0 is free for a number that goes with them.
 
 #include <array>
 #include <cstdint>
@@ -22,15 +24,17 @@ inline Lanes4 loadLanes(const float* aligned) {
     return v;
 }
 
-/// Lanes 1, 2, 0, 3.
-inline Lanes4 rotate3(Lanes4 v) {
-#ifdef __SSE2__
-    return _mm_shuffle_ps(v, v, _MM_SHUFFLE(3, 0, 2, 1));
-#else
-    return Lanes4{v[1], v[2], v[0], v[3]};
-#endif
+/// Lanes 0, 2, 3, 1.
+inline Lanes4 rotate(Lanes4 v) {
+    return __builtin_shufflevector(v, v, 0, 2, 3, 1);
 }
 
+template <int kLane>
+inline Lanes4 broadcast(Lanes4 v) {
+    return __builtin_shufflevector(v, v, kLane, kLane, kLane, kLane);
+}
+
+/// The larger of each lane; b where a is not a number.
 inline Lanes4 maxLanes(Lanes4 a, Lanes4 b) {
 #ifdef __SSE2__
     return _mm_max_ps(a, b);
@@ -60,21 +64,35 @@ inline uint32_t signBits(Lanes4 v) {
 #endif
 }
 
-/// The largest of lanes 0, 1, 2.
-inline float maxOf3(Lanes4 v) {
-    const Lanes4 once = rotate3(v);
-    return maxLanes(maxLanes(v, once), rotate3(once))[0];
+/// Bit i: the i-th of four numbers is `x`. They need not be aligned.
+inline uint32_t equalLanes(const uint32_t* numbers, uint32_t x) {
+    IntLanes4 v;
+    std::memcpy(&v, numbers, sizeof v);
+    return signBits(Lanes4(v == int32_t(x)));
 }
 
-/// Lanes 0 + 1 + 2.
-inline float sumOf3(Lanes4 v) {
-    const Lanes4 once = rotate3(v);
-    return (v + once + rotate3(once))[0];
+/// The largest of lanes 1, 2, 3, in lane 1.
+inline Lanes4 maxOfPoint(Lanes4 v) {
+    const Lanes4 once = rotate(v);
+    return maxLanes(maxLanes(v, once), rotate(once));
 }
 
-/// The cross product of lanes 0 to 2; lane 3 becomes zero if both are finite.
-inline Lanes4 cross3(Lanes4 a, Lanes4 b) {
-    return rotate3(a * rotate3(b) - rotate3(a) * b);
+/// Lane 0: the largest of lanes 1, 2, 3 of a; lane 1: of b.
+inline Lanes4 maxOfPoints(Lanes4 a, Lanes4 b) {
+    const Lanes4 last = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+    const Lanes4 most = maxLanes(last, __builtin_shufflevector(a, b, 1, 5, 1, 5));
+    return maxLanes(most, __builtin_shufflevector(most, most, 2, 3, 2, 3));
+}
+
+/// Lanes 1 + 2 + 3, in lane 1.
+inline Lanes4 sumOfPoint(Lanes4 v) {
+    const Lanes4 once = rotate(v);
+    return v + once + rotate(once);
+}
+
+/// The cross product of two points; lane 0 becomes zero if both are finite.
+inline Lanes4 crossPoints(Lanes4 a, Lanes4 b) {
+    return rotate(a * rotate(b) - rotate(a) * b);
 }
 
 inline void transpose(Lanes4& a, Lanes4& b, Lanes4& c, Lanes4& d) {
