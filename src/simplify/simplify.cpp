@@ -71,16 +71,31 @@ void addCurvePlanes(WorkingMesh& mesh, const Face& face, const Vec3f& normal) {
     }
 }
 
+/// A plane counts by its triangle's area and this many mean areas: by area alone, spikes and slivers
+/// weigh nothing and are cut off, and the largest distance is what a diamond states.
+/// (3: the dragon's stated errors by level fall by 30 to 40 %, the Moon's by 5 to 25 %.)
+constexpr double kEqualShare = 3;
+
+float areaOf(const WorkingMesh& mesh, const Face& face) {
+    const Vec3f a = mesh.point[face.v[0]].vec();
+    const Vec3f n = glm::cross(mesh.point[face.v[1]].vec() - a, mesh.point[face.v[2]].vec() - a);
+    return std::sqrt(glm::dot(n, n));
+}
+
 void buildQuadrics(WorkingMesh& mesh) {
+    double total = 0;
+    for (const Face& face : mesh.face) total += double(areaOf(mesh, face));
+    const float share =
+        float(kEqualShare * total / double(std::max<size_t>(mesh.face.size(), 1)));
     mesh.quadric.assign(mesh.point.size(), Quadric{});
     for (const Face& face : mesh.face) {
         const Vec3f a = mesh.point[face.v[0]].vec();
         const Vec3f cross =
             glm::cross(mesh.point[face.v[1]].vec() - a, mesh.point[face.v[2]].vec() - a);
-        const float area = std::sqrt(glm::dot(cross, cross));
+        const float area = areaOf(mesh, face);
         if (!(area > 0)) continue;
         const Vec3f normal = cross / area;
-        const Quadric q = Quadric::ofPlane(normal, area);
+        const Quadric q = Quadric::ofPlane(normal, area + share);
         for (const uint32_t v : face.v) mesh.quadric[v].addMatrix(q);
         if (face.classes() != 0) addCurvePlanes(mesh, face, normal);
     }
