@@ -8,7 +8,8 @@
 #include <tbb/parallel_pipeline.h>
 
 #include <cstddef>
-#include <memory>
+#include <optional>
+#include <vector>
 
 namespace pietra {
 
@@ -47,19 +48,26 @@ void parallelForSlices(size_t count, size_t grain, Body&& body) {
 template <class Produce, class Consume>
 void orderedPipeline(size_t count, size_t in_flight, Produce&& produce, Consume&& consume) {
     using Result = decltype(produce(size_t(0)));
+    // Results wait in slots of ours: where a body throws, the pipeline forgets what is under way. As
+    // they are consumed in order, those under way are consecutive: no two have one slot.
+    std::vector<std::optional<Result>> slots(in_flight);
     size_t next = 0;
     tbb::parallel_pipeline(
-        in_flight, tbb::make_filter<void, size_t>(tbb::filter_mode::serial_in_order,
-                                                  [&](tbb::flow_control& control) {
-                                                      if (next == count) control.stop();
-                                                      return next < count ? next++ : size_t(0);
-                                                  }) &
-                       tbb::make_filter<size_t, std::shared_ptr<Result>>(
-                           tbb::filter_mode::parallel,
-                           [&](size_t i) { return std::make_shared<Result>(produce(i)); }) &
-                       tbb::make_filter<std::shared_ptr<Result>, void>(
-                           tbb::filter_mode::serial_in_order,
-                           [&](const std::shared_ptr<Result>& result) { consume(*result); }));
+        in_flight,
+        tbb::make_filter<void, size_t>(tbb::filter_mode::serial_in_order,
+                                       [&](tbb::flow_control& control) {
+                                           if (next == count) control.stop();
+                                           return next < count ? next++ : size_t(0);
+                                       }) &
+            tbb::make_filter<size_t, size_t>(tbb::filter_mode::parallel,
+                                             [&](size_t i) {
+                                                 slots[i % in_flight].emplace(produce(i));
+                                                 return i;
+                                             }) &
+            tbb::make_filter<size_t, void>(tbb::filter_mode::serial_in_order, [&](size_t i) {
+                consume(*slots[i % in_flight]);
+                slots[i % in_flight].reset();
+            }));
 }
 
 /// Scratch space, one instance a thread, kept between tasks.

@@ -274,7 +274,7 @@ void Subdivision::makePoints() {
         g.position[at[k]] = position_[v];
         g.normal[at[k]] = Vec3d(normal_[v]);
         if (schema_.colours) g.colour[at[k]] = colour_[v];
-        std::copy_n(&scalar_[v * columns], columns, &g.scalar[at[k] * columns]);
+        std::copy_n(scalar_.data() + v * columns, columns, g.scalar.data() + at[k] * columns);
     }
     for (size_t s = m_; s > 1; s /= 2) {
         const size_t h = s / 2;
