@@ -3,8 +3,8 @@
 // refer to them by index, in bounded memory, whatever the file format.
 //
 // A source is opened by openSource(). Each of the two streams can be read from its start any number
-// of times, in any order, one stream at a time. Polygons come out as triangles (fans; concave ones
-// by ear clipping), strips as triangles with the right orientation. Batches are as large as the
+// of times, in any order, one stream at a time. Polygons come out as triangles (fans, also of concave
+// ones, which notes() counts), strips as triangles with the right orientation. Batches are as large as the
 // source likes, at most kMaxBatch elements. Not thread-safe. Faults throw InputError or IoError.
 
 #include <array>
@@ -40,8 +40,8 @@ public:
     virtual const AttributeSchema& schema() const = 0;
     /// Exact. May scan the file the first time it is called.
     virtual uint64_t vertexCount() = 0;
-    /// What is known before reading: exact where `triangleCountIsExact`, else the file's own count of
-    /// faces, for progress only.
+    /// What is known before reading, such as the file's own count of faces: for progress and sizes,
+    /// not exact where there are polygons or strips.
     virtual uint64_t triangleCountHint() = 0;
     /// Size of the input files in bytes (compressed size for compressed ones).
     virtual uint64_t inputBytes() const = 0;
