@@ -110,7 +110,7 @@ void Rasteriser::State::transform(BatchPatch& entry) const {
     const ImageBounds bounds =
         transformVertices(projection, mesh.position, mesh.normal, entry.vertex);
     entry.whole = bounds.whole;
-    entry.box = screen();
+    entry.box = bounds.behind ? PixelBox{} : screen();
     if (entry.whole)
         entry.box = entry.box.intersected(
             {bounds.min_x >> kSubpixelBits, bounds.min_y >> kSubpixelBits,
