@@ -178,6 +178,24 @@ Step step(const Level& level, size_t size, double keep, int index, Deviation& de
     return out;
 }
 
+/// Raises `e` to the largest distance of the triangle's points, by branch and bound down to
+/// `spacing`.
+void farthest(const DistanceOracle& oracle, const Vec3d& a, const Vec3d& b, const Vec3d& c,
+              double spacing, double& e) {
+    const Vec3d centre = (a + b + c) / 3.0;
+    const double d = oracle.nearest(centre).distance;
+    const double radius =
+        std::max({glm::length(a - centre), glm::length(b - centre), glm::length(c - centre)});
+    e = std::max(e, d);
+    if (radius <= spacing || d + radius <= 1.01 * e) return;
+    const Vec3d ab = 0.5 * (a + b), bc = 0.5 * (b + c), ca = 0.5 * (c + a);
+    for (const Vec3d& p : {ab, bc, ca}) e = std::max(e, oracle.nearest(p).distance);
+    farthest(oracle, a, ab, ca, spacing, e);
+    farthest(oracle, b, bc, ab, spacing, e);
+    farthest(oracle, c, ca, bc, spacing, e);
+    farthest(oracle, ab, bc, ca, spacing, e);
+}
+
 /// The true two-sided error of each patch: original vertices to the nearest face, and points of the
 /// faces to the original, the most promising faces first.
 std::vector<double> truth(const Mesh& original, const DistanceOracle& oracle, double spacing,
@@ -196,13 +214,12 @@ std::vector<double> truth(const Mesh& original, const DistanceOracle& oracle, do
     for (const uint32_t t : order) {
         double& e = error[level.patch[t]];
         if (b[t] <= e) continue;
-        Mesh one;
-        for (const uint32_t v : level.mesh.triangle[t])
-            one.position.push_back(level.mesh.position[v]);
-        one.triangle.push_back({0, 1, 2});
-        samplePoints(one, spacing, [&](const Vec3d& p, uint32_t) {
-            e = std::max(e, oracle.nearest(p).distance);
-        });
+        const Triangle& tri = level.mesh.triangle[t];
+        for (const uint32_t v : tri) {
+            e = std::max(e, oracle.nearest(Vec3d(level.mesh.position[v])).distance);
+        }
+        farthest(oracle, Vec3d(level.mesh.position[tri[0]]), Vec3d(level.mesh.position[tri[1]]),
+                 Vec3d(level.mesh.position[tri[2]]), spacing, e);
     }
     return error;
 }
@@ -246,7 +263,7 @@ int main(int argc, char** argv) {
         level = std::move(s.level);
         std::vector<double> ratio;
         if (want_truth) {
-            const std::vector<double> exact = truth(original, oracle, 0.3 * edge, level);
+            const std::vector<double> exact = truth(original, oracle, 0.2 * edge, level);
             for (size_t p = 0; p < exact.size(); ++p) ratio.push_back(s.stated[p] / exact[p]);
             all.insert(all.end(), ratio.begin(), ratio.end());
         }

@@ -306,7 +306,7 @@ TEST(Certificate, againstTheInputTheQuantisationCounts) {
     const auto violations = [&](float quantisation, double jitter) {
         settings.quantisation_error = quantisation;
         const ToyTerrain model = makeToyTerrain(settings);
-        MemorySource source(model, lattice, jitter);
+        MemorySource source = sourceOf(model, lattice, jitter);
         Budget budget(256 << 20);
         InputTriangles input(source, budget, 1 << 20, tempDir());
         const Truth truth = truthOfInput(input, lattice, source.triangleCountHint());
@@ -330,7 +330,7 @@ TEST(InputTriangles, areTheSameFromMemoryAndFromTheFile) {
     settings.keep_refining = 0.97;
     const ToyTerrain model = makeToyTerrain(settings);
     const Lattice lattice{{10, 20, 30}, 0.5, 0};
-    MemorySource source(model, lattice, 0.9);
+    MemorySource source = sourceOf(model, lattice, 0.9);
     ASSERT_GT(source.vertexCount() * sizeof(Vec3d), size_t(1) << 20);  // does not fit
     for (const bool shuffled : {false, true}) {
         if (shuffled) source.shuffleTriangles();

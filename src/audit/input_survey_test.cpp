@@ -30,7 +30,7 @@ TEST(InputSurvey, theFinestCutIsTheInput) {
     const Lattice lattice{{-70, 1e6, 3}, 0.01, 0};
     const PatchStream stream = streamOf(model.patches);
     const Cut finest = finestCut(model.nodes);
-    MemorySource source(model, lattice, 0.9);
+    MemorySource source = sourceOf(model, lattice, 0.9);
     const InputSurvey input = survey(source, lattice);
     EXPECT_EQ(input.surface.triangles, finest.triangles);
     EXPECT_EQ(input.degenerate + input.duplicate, 0u);
@@ -46,7 +46,7 @@ TEST(InputSurvey, doublesAndDegenerateTrianglesAreCountedOnce) {
     const ToyTerrain model = terrain();
     const PatchStream stream = streamOf(model.patches);
     const SurfaceFingerprint finest = fingerprintOfCut(stream, finestCut(model.nodes).nodes);
-    MemorySource source(model, {}, 0);
+    MemorySource source = sourceOf(model, {}, 0);
     const std::vector<EdgeKey> border = survey(source, {}).border;
     std::swap(source.triangle_[5][1], source.triangle_[5][2]);  // faces the other way
     EXPECT_FALSE(isSameSurface(finest, survey(source, {})));
@@ -69,7 +69,7 @@ TEST(InputSurvey, doublesAndDegenerateTrianglesAreCountedOnce) {
 
 TEST(InputSurvey, bordersAreTheEdgesUsedOnce) {
     const ToyTerrain model = terrain(11);
-    MemorySource source(model, {}, 0);
+    MemorySource source = sourceOf(model, {}, 0);
     source.triangle_.erase(source.triangle_.begin() + 100, source.triangle_.begin() + 103);
     std::map<EdgeKey, int> uses;
     for (const auto& t : source.triangle_)
@@ -87,7 +87,7 @@ TEST(InputSurvey, bordersAreTheEdgesUsedOnce) {
 
 TEST(InputSurvey, moreBorderThanMemoryIsRefused) {
     const ToyTerrain model = terrain();
-    MemorySource source(model, {}, 0);
+    MemorySource source = sourceOf(model, {}, 0);
     // A soup: no vertex is shared.
     for (size_t t = 0; t < source.triangle_.size(); ++t)
         for (uint64_t& corner : source.triangle_[t]) {
@@ -173,7 +173,7 @@ TEST(BorderChains, anySubsetOfVerticesKeptIsFineAndAnySkipIsNot) {
 
 TEST(BorderChains, cutsOfTheTerrainStayOnItsBorder) {
     const ToyTerrain model = terrain();
-    MemorySource source(model, {}, 0);
+    MemorySource source = sourceOf(model, {}, 0);
     InputSurvey input = survey(source, {});
     Budget budget(64 << 20);
     const BorderChains chains(input.border, budget);

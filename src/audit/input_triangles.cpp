@@ -15,8 +15,8 @@ Vec3i snapToLattice(const Lattice& lattice, const Vec3d& p) {
 }
 
 InputTriangles::InputTriangles(TriangleSource& source, Budget& budget, size_t memory_bytes,
-                               const std::string& temp_dir)
-    : source_(source), vertex_count_(source.vertexCount()) {
+                               const std::string& temp_dir, Progress* progress)
+    : source_(source), progress_(progress), vertex_count_(source.vertexCount()) {
     memory_bytes = std::max(memory_bytes, size_t(1) << 20);
     const bool fits = vertex_count_ <= memory_bytes / sizeof(Vec3d);
     const size_t bytes = fits ? size_t(vertex_count_) * sizeof(Vec3d) : memory_bytes;
@@ -35,6 +35,7 @@ void InputTriangles::readVertices() {
     VertexBatch batch;
     source_.rewindVertices();
     while (source_.readVertices(batch)) {
+        if (progress_) progress_->tick(batch.position.size());
         if (file_.isOpen())
             file_.write(batch.position.data(), batch.position.size() * sizeof(Vec3d));
         else
@@ -68,6 +69,7 @@ void InputTriangles::forEachBatch(const Visitor& visit) {
             corners.push_back({pa, pb, position(c)});
         }
         visit(batch.first, corners);
+        if (progress_) progress_->tick(corners.size());
     }
 }
 

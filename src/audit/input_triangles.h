@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "base/budget.h"
+#include "base/progress.h"
 #include "extmem/file.h"
 #include "geometry/lattice.h"
 #include "io/triangle_source.h"
@@ -33,8 +34,9 @@ public:
     /// Reads all vertices at once. Takes up to `memory_bytes` (1 MiB at least) of `budget`; both
     /// `source` and `budget` must outlive this. Throws what the source throws, IoError,
     /// MemoryError.
+    /// `progress` may be null; it is told vertices and triangles as they are read.
     InputTriangles(TriangleSource& source, Budget& budget, size_t memory_bytes,
-                   const std::string& temp_dir);
+                   const std::string& temp_dir, Progress* progress = nullptr);
 
     uint64_t vertexCount() const { return vertex_count_; }
     /// Reads all triangles, in the order of the input; `first` is the number of a batch's first
@@ -50,6 +52,7 @@ private:
     const Page& cachedPage(uint64_t page);
 
     TriangleSource& source_;
+    Progress* progress_;
     Reservation reservation_;
     uint64_t vertex_count_;
     std::vector<Vec3d> positions_;  // if they fit

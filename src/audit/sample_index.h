@@ -35,7 +35,8 @@ public:
     static constexpr uint32_t kNoTag = std::numeric_limits<uint32_t>::max();
 
     /// What n samples take, with what building the tree needs for a while.
-    static size_t bytesFor(size_t samples) { return samples * 144 + 4096; }
+    static constexpr size_t kSampleBytes = 144;
+    static size_t bytesFor(size_t samples) { return samples * kSampleBytes + 4096; }
 
     /// Throws MemoryError if the budget has not bytesFor(samples.size()); the budget must outlive
     /// this.

@@ -25,8 +25,10 @@ public:
     explicit Packer(std::vector<std::byte>& out) : out_(out) {}
     template <class T>
     void put(const T* data, size_t count) {
-        const auto* bytes = reinterpret_cast<const std::byte*>(data);
-        out_.insert(out_.end(), bytes, bytes + count * sizeof(T));
+        // note: insert() here makes g++ 12 warn of overflows that cannot be.
+        const size_t begin = out_.size();
+        out_.resize(begin + count * sizeof(T));
+        if (count) std::memcpy(out_.data() + begin, data, count * sizeof(T));
     }
 
 private:

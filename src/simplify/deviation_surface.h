@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "geometry/mesh.h"
+#include "simplify/lanes4.h"
 #include "simplify/triangle_distance.h"
 
 namespace pietra::deviation {
@@ -41,6 +42,8 @@ public:
         /// What lies across each edge: one that exists runs the other way round, as consistent
         /// winding has it. Missing at borders and where other than two faces meet.
         std::array<HalfEdge, 3> opposite;
+
+        Lanes4 normalLanes() const { return Lanes4{normal.x, normal.y, normal.z, 0}; }
     };
 
     void assign(const Mesh& mesh);

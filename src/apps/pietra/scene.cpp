@@ -20,6 +20,19 @@ Box3d Scene::bounds() const {
     return box;
 }
 
+std::vector<Sphere> Scene::balls() const {
+    constexpr uint16_t kLevel = 9;
+    std::vector<Sphere> balls;
+    for (const auto& model : models) {
+        const Lattice& lattice = model->info().lattice;
+        for (const Node& node : model->nodes())
+            if (node.level == kLevel || (node.level < kLevel && node.isLeaf()))
+                balls.push_back({Vec3f(lattice.toInput(Vec3d(node.saturated.centre))),
+                                 float(node.saturated.radius * lattice.step)});
+    }
+    return balls;
+}
+
 std::vector<const ModelReader*> Scene::views() const {
     std::vector<const ModelReader*> all;
     for (const auto& model : models) all.push_back(model.get());

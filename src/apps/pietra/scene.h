@@ -17,6 +17,8 @@ struct Scene {
     explicit Scene(const std::vector<std::string>& paths);
     /// Of all models, in input coordinates.
     Box3d bounds() const;
+    /// Balls that hold all models, some tens or hundreds, in input coordinates.
+    std::vector<Sphere> balls() const;
     std::vector<const ModelReader*> views() const;
 };
 

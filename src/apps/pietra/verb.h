@@ -28,6 +28,9 @@ struct VerbText {
     std::vector<std::string> usage;        ///< "IN... -o OUT.pietra [options]", without the name
     std::vector<std::string> description;  ///< paragraphs
     std::vector<std::pair<std::string, std::string>> examples;  ///< what for, command line
+    /// A table of words and what they mean, with its title; may be empty.
+    std::string terms_title = {};
+    std::vector<std::pair<std::string, std::string>> terms = {};
 };
 
 /// What a running verb is given.

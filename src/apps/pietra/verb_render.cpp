@@ -15,6 +15,7 @@
 #include "apps/pietra/verbs.h"
 #include "base/budget.h"
 #include "base/error.h"
+#include "multires/standard_views.h"
 #include "base/parallel.h"
 #include "base/text.h"
 #include "render/offline/offline_picture.h"
@@ -65,27 +66,35 @@ private:
 };
 
 VerbText RenderVerb::text() const {
-    return {
-        "render",
-        "draw a picture of one or more models",
-        {"FILE... -o OUT.png [options]"},
-        {"Draws the models as finely as the tolerance asks for: no point of the picture is moved "
-         "by "
-         "more than --pixels from where the full mesh would put it. --pixels 0 draws the full "
-         "mesh, "
-         "streamed: memory stays within --ram, however large the models are. No display and no "
-         "graphics driver is needed.",
-         "The picture is a PNG, with the depth of every pixel in a private chunk that other "
-         "programs skip and `pietra compare` reads.",
-         "Several models are drawn together, each in its own coordinates.",
-         "--show error colours each patch by how far its stated error may show, from blue for none "
-         "to red for --pixels (or for the largest there is, with --pixels 0). lod colours by "
-         "level of detail, patches and triangles each in a colour of its own."},
-        {{"the whole model from the front", "pietra render statue.pietra -o statue.png"},
-         {"which level of detail is drawn where",
-          "pietra render statue.pietra -o lod.png --view iso --show lod"},
-         {"the full mesh from a given camera, with smooth edges",
-          "pietra render statue.pietra -o full.png --camera c.json --pixels 0 --samples 4"}}};
+    return {"render",
+            "draw a picture of one or more models",
+            {"FILE... -o OUT.png [options]"},
+            {"Draws the models as finely as the tolerance asks for: no point of the picture is "
+             "moved by "
+             "more than --pixels from where the full mesh would put it. --pixels 0 draws the full "
+             "mesh, "
+             "streamed: memory stays within --ram, however large the models are. No display and no "
+             "graphics driver is needed.",
+             "The picture is a PNG, with the depth of every pixel in a private chunk that other "
+             "programs skip and `pietra compare` reads.",
+             "Several models are drawn together, each in its own coordinates."},
+            {{"the whole model from the front", "pietra render statue.pietra -o statue.png"},
+             {"which level of detail is drawn where",
+              "pietra render statue.pietra -o lod.png --view iso --show lod"},
+             {"the full mesh from a given camera, with smooth edges",
+              "pietra render statue.pietra -o full.png --camera c.json --pixels 0 --samples 4"}},
+            "What --show may show",
+            {{"shaded", "the surface, lit, in its own colours where it has any"},
+             {"normals", "the normal in view space, as red, green and blue"},
+             {"depth", "near is light"},
+             {"lod", "the level of detail"},
+             {"patches", "the pieces that are loaded and drawn as one"},
+             {"triangles", "each triangle in a colour of its own"},
+             {"error",
+              "how far the stated error may show, from blue for none to red for --pixels (or "
+              "for the largest there is, with --pixels 0)"},
+             {"colour", "the model's own colours, unlit"},
+             {"scalar:NAME", "a scalar attribute of the model, in a colour map"}}};
 }
 
 void RenderVerb::declare(OptionSet& options) {
@@ -95,9 +104,7 @@ void RenderVerb::declare(OptionSet& options) {
     camera_.declare(options);
     options.number("--pixels", "T", pixels_, {.min = 0},
                    "Tolerance in pixels; 0 draws the full mesh.");
-    options.custom("--show", "WHAT", "shaded",
-                   "What the colours mean: shaded, normals, depth, lod (level of detail), patches, "
-                   "triangles, error (the stated one), colour, or scalar:NAME.",
+    options.custom("--show", "WHAT", "shaded", "What the colours mean, see above.",
                    [this](const std::string& word) { parseShow(word); });
     options.custom("--range", "MIN:MAX", "those of the coarsest cut",
                    "Values at the two ends of the colours of --show scalar:NAME.",
@@ -220,7 +227,8 @@ int RenderVerb::run(const RunContext& context) {
     if (!output_.ends_with(".png")) throw UsageError(fmt::format("{}: is not named .png", output_));
     checkOutput(output_, context.common.force);
     const Scene scene(files_);
-    const Camera camera = camera_.camera(scene.bounds(), size_);
+    Camera camera = camera_.camera(scene.bounds(), size_);
+    if (!camera_.fileGiven()) camera = movedCloser(camera, scene.balls(), size_);
     context.progress.setStages(1);
     const OfflinePicture drawn = draw(scene, camera, context.progress);
     const size_t resident = peakResidentBytes();

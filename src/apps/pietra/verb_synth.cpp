@@ -34,10 +34,8 @@ private:
 };
 
 VerbText SynthVerb::text() const {
-    std::string kinds = "The kinds:";
-    for (const SynthKind& kind : synthKinds())
-        kinds += fmt::format(" {} is {};", kind.name, kind.about);
-    kinds.back() = '.';
+    std::vector<std::pair<std::string, std::string>> kinds;
+    for (const SynthKind& kind : synthKinds()) kinds.emplace_back(kind.name, kind.about);
     return {
         "synth",
         "make a mesh to try things with",
@@ -46,13 +44,14 @@ VerbText SynthVerb::text() const {
         {"Writes a generated mesh of any size, in bounded memory: the same bytes for the same "
          "options on every machine. The ending of the name decides the format: .ply, .obj, .stl "
          "or .glb.",
-         std::move(kinds),
          "Subdivision turns a scan into one 4^N times as large. Each level displaces its new "
          "vertices at random by up to --displace of the local edge, so that the large mesh is as "
          "rough as real scans are; a closed mesh stays closed."},
         {{"ten million triangles of a statue", "pietra synth statue -o statue.ply --triangles 10M"},
          {"a dragon of 223 million triangles",
-          "pietra synth subdivide dragon.ply -o dragon4.ply --levels 4 --displace 0.2"}}};
+          "pietra synth subdivide dragon.ply -o dragon4.ply --levels 4 --displace 0.2"}},
+        "Kinds",
+        kinds};
 }
 
 void SynthVerb::declare(OptionSet& options) {

@@ -26,6 +26,8 @@ constexpr size_t kLargestBatch = size_t(256) << 20;
 constexpr size_t kScreenVertexBytes = 16;
 constexpr size_t kPixelBytes = 17, kPixelBytesOfFour = 49;
 constexpr size_t kPictureBytes = sizeof(Rgba8) + sizeof(float);
+/// Threads with their stacks and heaps, and what else nobody counts.
+constexpr size_t kUncountedBytes = size_t(3) << 20;
 
 double msSince(Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -49,23 +51,6 @@ size_t drawnBytes(const Mesh& mesh) {
     return bytes(mesh.position) + bytes(mesh.triangle) + bytes(mesh.edge_class) +
            bytes(mesh.normal) + bytes(mesh.colour) + bytes(mesh.scalar) +
            mesh.vertexCount() * kScreenVertexBytes;
-}
-
-/// Greys from the nearest point of the picture (white) to its farthest.
-void paintDepth(Picture& picture) {
-    constexpr float kFarthest = 40, kNearest = 255;
-    float near = std::numeric_limits<float>::infinity(), far = 0;
-    for (const float depth : picture.depth)
-        if (std::isfinite(depth)) {
-            near = std::min(near, depth);
-            far = std::max(far, depth);
-        }
-    const float scale = far > near ? (kNearest - kFarthest) / (far - near) : 0;
-    for (size_t i = 0; i < picture.pixelCount(); ++i) {
-        if (!std::isfinite(picture.depth[i])) continue;
-        const auto grey = uint8_t(kNearest - (picture.depth[i] - near) * scale + 0.5f);
-        picture.colour[i] = {grey, grey, grey, 255};
-    }
 }
 
 class OfflineRenderer {
@@ -92,7 +77,6 @@ public:
                               settings_.shade);
         for (uint32_t m = 0; m < models_.size(); ++m) drawModel(m, rasteriser);
         result_.picture = rasteriser.finish();
-        if (settings_.shade.show == Show::kDepth) paintDepth(result_.picture);
         progress_.endStage();
         report(rasteriser.statistics());
         result_.statistics.total_ms = msSince(start);
@@ -132,8 +116,9 @@ private:
         const size_t pixel = settings_.samples == 4 ? kPixelBytesOfFour : kPixelBytes;
         fixed_bytes_ = tables +
                        size_t(size_.width) * size_t(size_.height) * (pixel + kPictureBytes) +
-                       in_flight() * page;
-        // The page that fills a batch may exceed it; with screen vertices it is twice as large.
+                       (in_flight() + size_t(settings_.jobs)) * page + kUncountedBytes;
+        // Each thread's decoder has scratch of a page's size. The page that fills a batch may
+        // exceed it; with screen vertices it is twice as large.
         const size_t least = fixed_bytes_ + 2 * page;
         if (least > settings_.memory_bytes)
             throw MemoryError(fmt::format("drawing this needs {} at least", formatBytes(least)));

@@ -131,25 +131,6 @@ TEST_F(OfflineTest, ModelsOnDifferentLatticesShareAScene) {
     EXPECT_EQ(same, one.statistics.pixels_covered);  // what lies behind hides nothing
 }
 
-TEST_F(OfflineTest, DepthIsLightWhereItIsNear) {
-    const Terrain terrain(writeTerrain("a", {0, 0, 0}));
-    OfflineSettings settings;
-    settings.shade.show = Show::kDepth;
-    const Picture picture = terrain.draw(settings).picture;
-    uint8_t lightest = 0, darkest = 255;
-    for (size_t i = 0; i < picture.pixelCount(); ++i) {
-        if (!std::isfinite(picture.depth[i])) continue;
-        lightest = std::max(lightest, picture.colour[i].r);
-        darkest = std::min(darkest, picture.colour[i].r);
-        for (size_t k = i; k < std::min(i + 50, picture.pixelCount()); ++k)
-            if (picture.depth[k] < picture.depth[i]) {
-                EXPECT_GE(picture.colour[k].r, picture.colour[i].r);
-            }
-    }
-    EXPECT_EQ(lightest, 255);
-    EXPECT_EQ(darkest, 40);
-}
-
 TEST_F(OfflineTest, SaysHowMuchMemoryItNeeds) {
     const Terrain terrain(writeTerrain("a", {0, 0, 0}));
     OfflineSettings settings;
