@@ -25,6 +25,9 @@ constexpr size_t kHeaderBytes = 4 + 4 + 4 + 8;
 constexpr size_t kSignatureBytes = 8;
 constexpr size_t kEndChunkBytes = 12;
 constexpr uint64_t kMaxPixels = uint64_t(1) << 28;
+/// One bit a pixel, and deflate packs at most 1032 bytes into one: memory is taken only for what
+/// the file may hold.
+constexpr uint64_t kMaxPixelsPerByte = 8 * 1032;
 
 /// Chunks, unlike the rest of the format here, are big-endian.
 void appendBigEndian(Bytes& out, uint32_t value) {
@@ -192,6 +195,8 @@ void decodeColour(const std::string& path, const Bytes& file, Picture& picture) 
         throw InputError(path, "", std::string("not a readable PNG: ") + image.message);
     if (uint64_t(image.width) * image.height > kMaxPixels)
         throw InputError(path, "", "the picture has more than 2^28 pixels");
+    if (uint64_t(image.width) * image.height > kMaxPixelsPerByte * file.size())
+        throw InputError::atByte(path, file.size(), "the PNG ends early");
     image.format = PNG_FORMAT_RGBA;
     picture.size = {int(image.width), int(image.height)};
     picture.colour.resize(picture.pixelCount());

@@ -1,6 +1,7 @@
 #include "render/picture.h"
 
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <cmath>
 #include <cstdlib>
@@ -112,6 +113,20 @@ TEST_F(PictureFile, MessagesNameTheFileAndThePlace) {
                                                  ": the depth chunk has a wrong checksum");
     }
     EXPECT_THROW(readPicture(path("absent.png")), IoError);
+    // A header that promises far more than there is.
+    bad = bytes("good.png");
+    bad[18] = bad[22] = 0x30;
+    const auto crc = uint32_t(crc32(0, reinterpret_cast<const Bytef*>(bad.data()) + 12, 17));
+    for (int k = 0; k < 4; ++k) bad[size_t(29 + k)] = char(crc >> (24 - 8 * k));
+    put("bad.png", bad);
+    try {
+        readPicture(path("bad.png"));
+        FAIL();
+    } catch (const InputError& error) {
+        EXPECT_EQ(
+            std::string(error.what()),
+            path("bad.png") + ": byte " + std::to_string(bad.size()) + ": the PNG ends early");
+    }
 }
 
 TEST(Shading, SrgbIsTheStandardAndBytesComeBack) {

@@ -21,11 +21,12 @@ namespace pietra {
 using VisibilityKey = uint64_t;
 /// Lower word of a sample whose colour is already in the picture; beats equal depths to come.
 inline constexpr uint32_t kResolved = 0xffffffff;
+inline constexpr uint32_t kMaxTriangleNumber = 0xfffffffe;
 inline constexpr uint32_t lowerWord(uint32_t triangle_number) {
-    return 0xfffffffe - triangle_number;
+    return kMaxTriangleNumber - triangle_number;
 }
 inline constexpr uint32_t triangleNumber(VisibilityKey key) {
-    return 0xfffffffe - uint32_t(key);
+    return kMaxTriangleNumber - uint32_t(key);
 }
 
 /// Where a thread draws: one tile of the buffer.

@@ -61,6 +61,7 @@ struct Rasteriser::State {
     }
     void begin();
     PixelBox screen() const { return {0, 0, picture.size.width, picture.size.height}; }
+    void checkScalars(const Mesh& mesh) const;
     void layOut(std::span<const DrawPatch> patches);
     void transform(BatchPatch& patch) const;
     std::vector<DrawChunk> makeChunks() const;
@@ -83,10 +84,19 @@ void Rasteriser::State::begin() {
     statistics = {};
 }
 
+void Rasteriser::State::checkScalars(const Mesh& mesh) const {
+    if (settings.show != Show::kScalar || mesh.scalar.empty()) return;
+    CHECK_EQ(mesh.scalar.size(), mesh.vertexCount() * size_t(settings.scalar_count));
+    CHECK_LT(settings.scalar_index, settings.scalar_count);
+}
+
 void Rasteriser::State::layOut(std::span<const DrawPatch> patches) {
     batch.patch.clear();
     size_t vertices = 0, number = 0;
-    for (const DrawPatch& patch : patches) vertices += patch.mesh->vertexCount();
+    for (const DrawPatch& patch : patches) {
+        checkScalars(*patch.mesh);
+        vertices += patch.mesh->vertexCount();
+    }
     batch.vertex.resize(vertices);
     vertices = 0;
     for (const DrawPatch& patch : patches) {
@@ -100,6 +110,7 @@ void Rasteriser::State::layOut(std::span<const DrawPatch> patches) {
         vertices += patch.mesh->vertexCount();
         number += patch.mesh->triangleCount();
     }
+    CHECK_LT(number, size_t(kMaxTriangleNumber));
     statistics.triangles += number;
     statistics.patches += patches.size();
 }
@@ -110,7 +121,7 @@ void Rasteriser::State::transform(BatchPatch& entry) const {
     const ImageBounds bounds =
         transformVertices(projection, mesh.position, mesh.normal, entry.vertex);
     entry.whole = bounds.whole;
-    entry.box = screen();
+    entry.box = bounds.behind ? PixelBox{} : screen();
     if (entry.whole)
         entry.box = entry.box.intersected(
             {bounds.min_x >> kSubpixelBits, bounds.min_y >> kSubpixelBits,

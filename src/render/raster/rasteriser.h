@@ -13,7 +13,7 @@
 // Determinism: the picture does not depend on the number of threads, the SIMD level, or how the
 // draw list was cut into calls of draw().
 //
-// Memory: 17 bytes a pixel (49 with 4 samples), and 16 a vertex of the largest batch.
+// Memory: 16 bytes a pixel (56 with 4 samples), and 16 a vertex of the largest draw().
 // Not thread-safe: one thread calls, many work.
 
 #include <cstdint>
@@ -56,7 +56,8 @@ public:
     /// What is drawn from now on lies on another lattice (another model of the same scene); `view`
     /// is the same camera and size in its coordinates.
     void setModel(const View& view, const Lattice& lattice);
-    /// Draws, and shades what is visible so far: the meshes may vanish afterwards.
+    /// Draws, and shades what is visible so far: the meshes may vanish afterwards. At most 2^32 - 2
+    /// triangles a call.
     void draw(std::span<const DrawPatch> patches);
     /// Completes the picture, which is valid until restart(); nothing can be drawn in between.
     const Picture& finish();

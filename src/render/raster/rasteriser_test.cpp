@@ -286,6 +286,29 @@ TEST(Picture, IsTheSameWhereverOnEarthTheModelLies) {
     }
 }
 
+TEST(Picture, ModelsOnDifferentLatticesHideEachOther) {
+    const Scene scene;
+    const Camera camera{{500, 20, 900}, {520, 900, 100}, {0, 0, 1}, 80};
+    const View view(camera, {161, 123}, Lattice{});
+    const Picture expected = render(view, scene.patches);
+    // The first three meshes on a lattice of half the step, and shifted.
+    Lattice fine;
+    fine.origin = Vec3d(-64, -128, -256);
+    fine.step = 0.5;
+    std::vector<Mesh> meshes(scene.meshes.begin(), scene.meshes.begin() + 3);
+    std::vector<DrawPatch> patches(scene.patches.begin(), scene.patches.begin() + 3);
+    for (size_t i = 0; i < 3; ++i) {
+        for (Vec3i& p : meshes[i].position) p = 2 * (p + Vec3i(64, 128, 256));
+        patches[i].mesh = &meshes[i];
+    }
+    Rasteriser rasteriser(view, Lattice{}, 1, {});
+    rasteriser.setModel(View(camera, {161, 123}, fine), fine);
+    rasteriser.draw(patches);
+    rasteriser.setModel(view, Lattice{});
+    rasteriser.draw(std::span(scene.patches).subspan(3));
+    expectSame(rasteriser.finish(), expected, "two lattices");
+}
+
 /// What a ray through the pixel's centre meets first; negative where it passes within `margin`
 /// (relative to the triangle's size in the picture) of an edge.
 float traced(const View& view, std::span<const DrawPatch> patches, int x, int y, double margin) {

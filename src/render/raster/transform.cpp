@@ -25,7 +25,7 @@ public:
         const DI di;
         min_x_ = min_y_ = hn::Set(di, std::numeric_limits<int32_t>::max());
         max_x_ = max_y_ = hn::Set(di, std::numeric_limits<int32_t>::lowest());
-        missing_ = hn::Zero(di);
+        missing_ = in_front_ = hn::Zero(di);
     }
 
     HWY_INLINE void run(const int32_t* position, const int32_t* normal, int32_t* out) {
@@ -64,13 +64,17 @@ public:
         max_x_ = hn::IfThenElse(keep, hn::Max(max_x_, fixed_x), max_x_);
         max_y_ = hn::IfThenElse(keep, hn::Max(max_y_, fixed_y), max_y_);
         missing_ = hn::Or(missing_, hn::VecFromMask(di, hn::Not(keep)));
+        in_front_ = hn::Or(in_front_, hn::VecFromMask(di, hn::RebindMask(di, in_front)));
     }
 
     HWY_INLINE ImageBounds bounds() const {
         const DI di;
         return {hn::AllTrue(di, hn::Eq(missing_, hn::Zero(di))),
-                hn::GetLane(hn::MinOfLanes(di, min_x_)), hn::GetLane(hn::MinOfLanes(di, min_y_)),
-                hn::GetLane(hn::MaxOfLanes(di, max_x_)), hn::GetLane(hn::MaxOfLanes(di, max_y_))};
+                hn::AllTrue(di, hn::Eq(in_front_, hn::Zero(di))),
+                hn::GetLane(hn::MinOfLanes(di, min_x_)),
+                hn::GetLane(hn::MinOfLanes(di, min_y_)),
+                hn::GetLane(hn::MaxOfLanes(di, max_x_)),
+                hn::GetLane(hn::MaxOfLanes(di, max_y_))};
     }
 
 private:
@@ -81,7 +85,7 @@ private:
     }
 
     const Projection& p_;
-    VI min_x_, min_y_, max_x_, max_y_, missing_;
+    VI min_x_, min_y_, max_x_, max_y_, missing_, in_front_;
 };
 
 ImageBounds TransformVertices(const Projection& projection, const int32_t* position,

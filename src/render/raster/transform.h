@@ -11,6 +11,7 @@ namespace pietra {
 /// What transformVertices() found.
 struct ImageBounds {
     bool whole = true;                   ///< every vertex has an image
+    bool behind = true;                  ///< no vertex is in front of the eye
     int32_t min_x, min_y, max_x, max_y;  ///< of the images, in 1/256 pixel; min > max without any
 };
 
