@@ -1,7 +1,7 @@
 # One library a folder: add_module(NAME DEPENDS module... PACKAGES target... [PROGRAM program]).
 # Every *.cpp beside the CMakeLists.txt belongs to it, but *_test.cpp, which make one test program,
 # and main.cpp, which makes the PROGRAM.
-# tools/check_layers.sh compares the includes with DEPENDS.
+# tools/check_layers.py compares the includes with DEPENDS.
 
 find_package(PkgConfig REQUIRED)
 find_package(TBB REQUIRED)

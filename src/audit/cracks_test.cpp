@@ -3,11 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <bit>
-#include <filesystem>
 #include <map>
 #include <mutex>
 #include <set>
 
+#include "audit/audit_testing.h"
 #include "audit/spill_table.h"
 #include "base/hash.h"
 #include "base/parallel.h"
@@ -16,16 +16,6 @@
 
 namespace pietra {
 namespace {
-
-std::string tempDir() {
-    return std::filesystem::temp_directory_path().string();
-}
-
-PatchStream streamOf(const std::vector<Mesh>& patches) {
-    return [&patches](std::span<const NodeIndex> nodes, const PatchVisitor& visit) {
-        parallelFor(nodes.size(), [&](size_t k) { visit(nodes[k], patches[nodes[k]]); });
-    };
-}
 
 CrackReport countAll(const std::vector<Mesh>& patches, size_t memory_bytes = 8 << 20) {
     Budget budget(64 << 20);

@@ -21,7 +21,8 @@ TEST(Check, printsOperands) {
 }
 
 TEST(Error, namesFilePlaceAndFault) {
-    EXPECT_STREQ(InputError::atByte("a.ply", 17, "no vertices").what(), "a.ply: byte 17: no vertices");
+    EXPECT_STREQ(InputError::atByte("a.ply", 17, "no vertices").what(),
+                 "a.ply: byte 17: no vertices");
     EXPECT_STREQ(InputError::atLine("a.obj", 3, "bad index").what(), "a.obj: line 3: bad index");
     EXPECT_EQ(IoError("x", "open", 2).exitCode(), 4);
     EXPECT_STREQ(IoError("x", "open", 2).what(), "x: cannot open: No such file or directory");

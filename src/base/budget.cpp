@@ -52,7 +52,9 @@ Reservation Budget::tryReserve(size_t bytes) {
     return take(bytes) ? Reservation(this, bytes) : Reservation();
 }
 
-size_t Budget::available() const { return limit_ - std::min(used(), limit_); }
+size_t Budget::available() const {
+    return limit_ - std::min(used(), limit_);
+}
 
 namespace {
 
@@ -66,13 +68,17 @@ size_t statusField(const char* name) {
 
 }  // namespace
 
-size_t residentBytes() { return statusField("VmRSS:"); }
-size_t peakResidentBytes() { return statusField("VmHWM:"); }
+size_t residentBytes() {
+    return statusField("VmRSS:");
+}
+size_t peakResidentBytes() {
+    return statusField("VmHWM:");
+}
 
 size_t machineMemoryBytes() {
     size_t bytes = size_t(sysconf(_SC_PHYS_PAGES)) * size_t(sysconf(_SC_PAGE_SIZE));
-    for (const char* path : {"/sys/fs/cgroup/memory.max",
-                             "/sys/fs/cgroup/memory/memory.limit_in_bytes"}) {
+    for (const char* path :
+         {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"}) {
         std::ifstream file(path);
         size_t limit = 0;
         if (file >> limit) bytes = std::min(bytes, limit);

@@ -19,20 +19,20 @@ public:
 
 }  // namespace pietra
 
-#define CHECK(condition)                                                     \
-    do {                                                                     \
-        if (!(condition)) [[unlikely]]                                       \
+#define CHECK(condition)                                                      \
+    do {                                                                      \
+        if (!(condition)) [[unlikely]]                                        \
             ::pietra::failCheck(__FILE__, __LINE__, "CHECK(" #condition ")"); \
     } while (false)
 
-#define PIETRA_CHECK_OP(a, op, b)                                                           \
-    do {                                                                                    \
-        const auto& check_a_ = (a);                                                         \
-        const auto& check_b_ = (b);                                                         \
-        if (!(check_a_ op check_b_)) [[unlikely]]                                           \
-            ::pietra::failCheck(__FILE__, __LINE__,                                         \
-                                fmt::format("CHECK(" #a " " #op " " #b "): {} and {}",      \
-                                            check_a_, check_b_));                           \
+#define PIETRA_CHECK_OP(a, op, b)                                                            \
+    do {                                                                                     \
+        const auto& check_a_ = (a);                                                          \
+        const auto& check_b_ = (b);                                                          \
+        if (!(check_a_ op check_b_)) [[unlikely]]                                            \
+            ::pietra::failCheck(                                                             \
+                __FILE__, __LINE__,                                                          \
+                fmt::format("CHECK(" #a " " #op " " #b "): {} and {}", check_a_, check_b_)); \
     } while (false)
 
 #define CHECK_EQ(a, b) PIETRA_CHECK_OP(a, ==, b)

@@ -1,6 +1,6 @@
 #pragma once
-// Parallel loops over oneTBB. Bodies must not depend on the order of execution; results that reach a
-// file are written in index order by the caller, so output is the same for any number of threads.
+// Parallel loops over oneTBB. Bodies must not depend on the order of execution; results that reach
+// a file are written in index order by the caller, so output is the same for any number of threads.
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/global_control.h>
@@ -8,7 +8,8 @@
 #include <tbb/parallel_pipeline.h>
 
 #include <cstddef>
-#include <memory>
+#include <optional>
+#include <vector>
 
 namespace pietra {
 
@@ -25,41 +26,48 @@ private:
 /// body(i) for each i of [0, count), one task each: for coarse work.
 template <class Body>
 void parallelFor(size_t count, Body&& body) {
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, count, 1),
-                      [&](const tbb::blocked_range<size_t>& range) {
-                          for (size_t i = range.begin(); i < range.end(); ++i) body(i);
-                      },
-                      tbb::simple_partitioner());
+    tbb::parallel_for(
+        tbb::blocked_range<size_t>(0, count, 1),
+        [&](const tbb::blocked_range<size_t>& range) {
+            for (size_t i = range.begin(); i < range.end(); ++i) body(i);
+        },
+        tbb::simple_partitioner());
 }
 
 /// body(begin, end) over slices of [0, count) of about `grain` elements: for fine work.
 template <class Body>
 void parallelForSlices(size_t count, size_t grain, Body&& body) {
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, count, grain),
-                      [&](const tbb::blocked_range<size_t>& range) {
-                          body(range.begin(), range.end());
-                      },
-                      tbb::simple_partitioner());
+    tbb::parallel_for(
+        tbb::blocked_range<size_t>(0, count, grain),
+        [&](const tbb::blocked_range<size_t>& range) { body(range.begin(), range.end()); },
+        tbb::simple_partitioner());
 }
 
-/// produce(i) in parallel for i of [0, count); consume(result) for one at a time, in the order of i. At
-/// most `in_flight` results exist at a time.
+/// produce(i) in parallel for i of [0, count); consume(result) for one at a time, in the order of
+/// i. At most `in_flight` results exist at a time.
 template <class Produce, class Consume>
 void orderedPipeline(size_t count, size_t in_flight, Produce&& produce, Consume&& consume) {
     using Result = decltype(produce(size_t(0)));
+    // Results wait in slots of ours: where a body throws, the pipeline forgets what is under way. As
+    // they are consumed in order, those under way are consecutive: no two have one slot.
+    std::vector<std::optional<Result>> slots(in_flight);
     size_t next = 0;
     tbb::parallel_pipeline(
-        in_flight, tbb::make_filter<void, size_t>(tbb::filter_mode::serial_in_order,
-                                                  [&](tbb::flow_control& control) {
-                                                      if (next == count) control.stop();
-                                                      return next < count ? next++ : size_t(0);
-                                                  }) &
-                       tbb::make_filter<size_t, std::shared_ptr<Result>>(
-                           tbb::filter_mode::parallel,
-                           [&](size_t i) { return std::make_shared<Result>(produce(i)); }) &
-                       tbb::make_filter<std::shared_ptr<Result>, void>(
-                           tbb::filter_mode::serial_in_order,
-                           [&](const std::shared_ptr<Result>& result) { consume(*result); }));
+        in_flight,
+        tbb::make_filter<void, size_t>(tbb::filter_mode::serial_in_order,
+                                       [&](tbb::flow_control& control) {
+                                           if (next == count) control.stop();
+                                           return next < count ? next++ : size_t(0);
+                                       }) &
+            tbb::make_filter<size_t, size_t>(tbb::filter_mode::parallel,
+                                             [&](size_t i) {
+                                                 slots[i % in_flight].emplace(produce(i));
+                                                 return i;
+                                             }) &
+            tbb::make_filter<size_t, void>(tbb::filter_mode::serial_in_order, [&](size_t i) {
+                consume(*slots[i % in_flight]);
+                slots[i % in_flight].reset();
+            }));
 }
 
 /// Scratch space, one instance a thread, kept between tasks.

@@ -1,7 +1,8 @@
 #pragma once
-// Progress and cancellation of a long job. Work functions take a `Progress&`, name their stages, and
-// tick; a tick throws Interrupted once cancellation was asked for. How it is shown (bar, lines, JSON)
-// is the command line's business: it implements `ProgressSink`. tick() is thread-safe and cheap.
+// Progress and cancellation of a long job. Work functions take a `Progress&`, name their stages,
+// and tick; a tick throws Interrupted once cancellation was asked for. How it is shown (bar, lines,
+// JSON) is the command line's business: it implements `ProgressSink`. tick() is thread-safe and
+// cheap.
 
 #include <atomic>
 #include <chrono>

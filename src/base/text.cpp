@@ -11,14 +11,21 @@ std::optional<uint64_t> parseBytes(std::string_view text) {
     const auto [rest, fault] = std::from_chars(text.data(), end, value, std::chars_format::fixed);
     if (fault != std::errc() || !(value >= 0)) return std::nullopt;
     std::string_view unit(rest, size_t(end - rest));
-    if (unit.ends_with("iB")) unit.remove_suffix(2);
-    else if (unit.ends_with('B')) unit.remove_suffix(1);
+    if (unit.ends_with("iB"))
+        unit.remove_suffix(2);
+    else if (unit.ends_with('B'))
+        unit.remove_suffix(1);
     double factor = 1;
-    if (unit == "k" || unit == "K") factor = 0x1p10;
-    else if (unit == "M") factor = 0x1p20;
-    else if (unit == "G") factor = 0x1p30;
-    else if (unit == "T") factor = 0x1p40;
-    else if (!unit.empty()) return std::nullopt;
+    if (unit == "k" || unit == "K")
+        factor = 0x1p10;
+    else if (unit == "M")
+        factor = 0x1p20;
+    else if (unit == "G")
+        factor = 0x1p30;
+    else if (unit == "T")
+        factor = 0x1p40;
+    else if (!unit.empty())
+        return std::nullopt;
     if (value * factor >= 0x1p63) return std::nullopt;
     return uint64_t(value * factor);
 }

@@ -88,8 +88,7 @@ private:
 
     void addAttributes(const std::byte* record) {
         mesh().normal.emplace_back();
-        if (record_.normals)
-            std::memcpy(&mesh().normal.back(), record + record_.normal_offset, 4);
+        if (record_.normals) std::memcpy(&mesh().normal.back(), record + record_.normal_offset, 4);
         if (record_.colours)
             std::memcpy(&mesh().colour.emplace_back(), record + record_.colour_offset, 4);
         for (size_t s = 0; s < record_.scalar_count; ++s)
@@ -198,7 +197,8 @@ private:
     }
 
     static OctNormal encodeSum(const Vec3l& sum) {
-        const auto largest = std::max({std::abs(sum.x), std::abs(sum.y), std::abs(sum.z), int64_t(1)});
+        const auto largest =
+            std::max({std::abs(sum.x), std::abs(sum.y), std::abs(sum.z), int64_t(1)});
         return encodeNormal(Vec3f(Vec3d(sum) / double(largest)));
     }
 
@@ -286,8 +286,8 @@ private:
         }
     }
 
-    // Duplicates and ghosts may have left vertices that no own triangle uses; ghosts' come last, and
-    // duplicates share all of theirs with the one that stays.
+    // Duplicates and ghosts may have left vertices that no own triangle uses; ghosts' come last,
+    // and duplicates share all of theirs with the one that stays.
     void trim() {
         position_.resize(own_vertices_);
         mesh().position = std::move(position_);
@@ -360,8 +360,8 @@ void applyMessages(std::span<const Message> messages, BucketMesh& bucket) {
                                                 Edge{std::min(a, b), std::max(a, b), 0});
             if (found == edges.end() || found->a != std::min(a, b) || found->b != std::max(a, b))
                 continue;
-            mesh.edge_class[t] = uint8_t((mesh.edge_class[t] & ~(3u << (2 * e))) |
-                                         found->value << (2 * e));
+            mesh.edge_class[t] =
+                uint8_t((mesh.edge_class[t] & ~(3u << (2 * e))) | found->value << (2 * e));
         }
 }
 

@@ -9,8 +9,8 @@ namespace pietra {
 
 namespace {
 
-// Root r holds the points whose coordinates are in descending order along axes kAxes[r]; ties fall to
-// the first of these orders that fits.
+// Root r holds the points whose coordinates are in descending order along axes kAxes[r]; ties fall
+// to the first of these orders that fits.
 constexpr std::array<std::array<int, 3>, 6> kAxes = {
     {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
 
@@ -157,18 +157,18 @@ uint64_t diamondKey(CellId cell) {
 }
 
 std::vector<CellId> diamondCells(CellId cell) {
-    // All bisecting planes are x = c or x = +-y + c (and permutations). Through the midpoint they cut
-    // space into 48 chambers, one for each signed permutation of (3, 2, 1), so a point next to the
-    // midpoint in each chamber finds every cell around the refinement edge.
+    // All bisecting planes are x = c or x = +-y + c (and permutations). Through the midpoint they
+    // cut space into 48 chambers, one for each signed permutation of (3, 2, 1), so a point next to
+    // the midpoint in each chamber finds every cell around the refinement edge.
     const int level = cellLevel(cell);
-    constexpr int kScale = 64;  // a point at distance 3/64 of a lattice unit: inside any cell's chamber
+    constexpr int kScale =
+        64;  // a point at distance 3/64 of a lattice unit: inside any cell's chamber
     const Vec3i centre = refinementEdgeSum(cell) * (kScale / 2);
     std::vector<CellId> cells;
     for (const auto& axes : kAxes)
         for (int signs = 0; signs < 8; ++signs) {
             Vec3i p = centre;
-            for (int k = 0; k < 3; ++k)
-                p[axes[size_t(k)]] += (signs >> k & 1 ? -1 : 1) * (3 - k);
+            for (int k = 0; k < 3; ++k) p[axes[size_t(k)]] += (signs >> k & 1 ? -1 : 1) * (3 - k);
             if (glm::min(p.x, glm::min(p.y, p.z)) < 0) continue;
             if (glm::max(p.x, glm::max(p.y, p.z)) > kScale << kLatticeBits) continue;
             const CellId found = cellAt(cellPath(p, kScale, level), level);

@@ -6,8 +6,8 @@
 // the partition. All predicates are exact in integers; points on a cell's face go to the second
 // child, so each point has exactly one path.
 //
-// All cells of one level that share their refinement edge form a diamond; its key is the midpoint of
-// that edge. Pure functions, thread-safe.
+// All cells of one level that share their refinement edge form a diamond; its key is the midpoint
+// of that edge. Pure functions, thread-safe.
 
 #include <array>
 #include <bit>
@@ -29,9 +29,15 @@ using CellPath = uint64_t;
 /// the children of c are 2c and 2c+1.
 using CellId = uint64_t;
 
-inline int cellLevel(CellId cell) { return 60 - std::countl_zero(cell); }
-inline CellId cellParent(CellId cell) { return cell >> 1; }
-inline CellId cellChild(CellId cell, int bit) { return cell << 1 | uint64_t(bit); }
+inline int cellLevel(CellId cell) {
+    return 60 - std::countl_zero(cell);
+}
+inline CellId cellParent(CellId cell) {
+    return cell >> 1;
+}
+inline CellId cellChild(CellId cell, int bit) {
+    return cell << 1 | uint64_t(bit);
+}
 /// The cell at `level` that holds every point of this path.
 inline CellId cellAt(CellPath path, int level) {
     return uint64_t(1) << (3 + level) | path >> (61 - level);

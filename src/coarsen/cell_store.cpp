@@ -13,8 +13,8 @@ namespace {
 struct BlobHeader {
     uint32_t vertices;
     uint32_t triangles;
-    uint8_t has_classes;     // else all are zero
-    uint8_t has_bounds;      // else all are `bound`
+    uint8_t has_classes;  // else all are zero
+    uint8_t has_bounds;   // else all are `bound`
     uint8_t has_colours;
     uint8_t pad = 0;
     float bound;
@@ -25,8 +25,10 @@ public:
     explicit Packer(std::vector<std::byte>& out) : out_(out) {}
     template <class T>
     void put(const T* data, size_t count) {
-        const auto* bytes = reinterpret_cast<const std::byte*>(data);
-        out_.insert(out_.end(), bytes, bytes + count * sizeof(T));
+        // note: insert() here makes g++ 12 warn of overflows that cannot be.
+        const size_t begin = out_.size();
+        out_.resize(begin + count * sizeof(T));
+        if (count) std::memcpy(out_.data() + begin, data, count * sizeof(T));
     }
 
 private:
@@ -137,8 +139,10 @@ void CellStore::get(const CellBlob& blob, CellMesh& cell) const {
     } else {
         unpack.get(mesh.triangle.data(), header.triangles);
     }
-    if (header.has_classes) unpack.get(mesh.edge_class, header.triangles);
-    else mesh.edge_class.assign(header.triangles, 0);
+    if (header.has_classes)
+        unpack.get(mesh.edge_class, header.triangles);
+    else
+        mesh.edge_class.assign(header.triangles, 0);
 }
 
 }  // namespace pietra

@@ -11,8 +11,8 @@ namespace {
 
 constexpr int kOccupiedLevels = 6;
 
-/// Of the 64 descendants six levels below a cell, those below `descendant`; `deeper` = its level less
-/// the cell's, at most 6.
+/// Of the 64 descendants six levels below a cell, those below `descendant`; `deeper` = its level
+/// less the cell's, at most 6.
 uint64_t occupancyRange(CellId descendant, int deeper) {
     const uint64_t within = descendant & ((uint64_t(1) << deeper) - 1);
     const int width = 1 << (kOccupiedLevels - deeper);
@@ -23,8 +23,7 @@ uint64_t occupancyRange(CellId descendant, int deeper) {
 /// What a child's occupancy is, as far as its parent's tells: one level less is known.
 uint64_t childOccupancy(uint64_t parent, int bit) {
     uint64_t child = 0;
-    for (int i = 0; i < 64; ++i)
-        child |= (parent >> (32 * bit + i / 2) & 1) << i;
+    for (int i = 0; i < 64; ++i) child |= (parent >> (32 * bit + i / 2) & 1) << i;
     return child;
 }
 
@@ -73,8 +72,8 @@ void CellTree::mergeSmall(uint32_t leaf_triangles) {
             if (at == leaf_.end()) continue;  // merged with its sibling already
             const CellId parent = cellParent(cell), sibling = cell ^ 1;
             const auto other = leaf_.find(sibling);
-            const uint64_t total =
-                uint64_t(at->second.triangles) + (other == leaf_.end() ? 0 : other->second.triangles);
+            const uint64_t total = uint64_t(at->second.triangles) +
+                                   (other == leaf_.end() ? 0 : other->second.triangles);
             if (total > leaf_triangles || has_split_child.count(sibling) ||
                 has_split_child.count(cell)) {
                 keepSplit(parent);
@@ -91,7 +90,8 @@ void CellTree::mergeSmall(uint32_t leaf_triangles) {
 }
 
 void CellTree::close() {
-    // From the deepest level up: closing a diamond splits cells of its own level and of coarser ones.
+    // From the deepest level up: closing a diamond splits cells of its own level and of coarser
+    // ones.
     for (int level = deepest_; level >= 0; --level) {
         std::unordered_set<uint64_t> seen;
         for (size_t i = 0; i < split_[size_t(level)].size(); ++i) {
@@ -118,9 +118,9 @@ void CellTree::forceSplit(CellId cell) {
             ++deeper;
         }
         if (is_split_.count(cover)) return;  // the child towards `cell` has no triangles
-        const uint64_t range = occupancyRange(deeper <= kOccupiedLevels ? cell
-                                                                        : cell >> (deeper - 6),
-                                              std::min(deeper, kOccupiedLevels));
+        const uint64_t range =
+            occupancyRange(deeper <= kOccupiedLevels ? cell : cell >> (deeper - 6),
+                           std::min(deeper, kOccupiedLevels));
         if ((leaf_.at(cover).occupied & range) == 0) return;
         splitLeaf(cover);
         ++forced_;

@@ -1,8 +1,9 @@
 #pragma once
 // The table of cells: which cells of the hierarchy exist, and which are leaves. Built from the leaf
 // cells that the buckets found; closed so that a diamond is split only as a whole (Cignoni et al.
-// 2004, section 3): where one cell of a diamond is split, every other cell of it that holds triangles
-// exists and is split too. A few tens of bytes a cell; the only data that grow with the input.
+// 2004, section 3): where one cell of a diamond is split, every other cell of it that holds
+// triangles exists and is split too. A few tens of bytes a cell; the only data that grow with the
+// input.
 
 #include <cstdint>
 #include <span>

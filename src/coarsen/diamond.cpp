@@ -10,9 +10,11 @@ namespace pietra {
 namespace {
 
 constexpr uint32_t kNoVertex = ~0u;
-// Diamonds of the top levels are few: there, halving to the end costs nothing and makes small roots.
+// Diamonds of the top levels are few: there, halving to the end costs nothing and makes small
+// roots.
 constexpr int kTopLevels = 6;
-constexpr uint32_t kSmallestPatch = 250;
+constexpr uint32_t kSmallTopPatch = 250;
+constexpr uint32_t kSmallestPatch = 128;  // below this there is nothing to gain
 
 void copyVertex(const Mesh& from, uint32_t v, int scalar_count, Mesh& to) {
     to.position.push_back(from.position[v]);
@@ -26,9 +28,12 @@ void copyVertex(const Mesh& from, uint32_t v, int scalar_count, Mesh& to) {
 
 uint32_t cellQuota(uint64_t children_triangles, uint32_t patch_triangles, int level) {
     const uint64_t half = (children_triangles + 1) / 2;
-    const uint64_t wanted = level < kTopLevels ? std::min(kSmallestPatch, patch_triangles / 2)
-                                               : patch_triangles / 2;
-    return uint32_t(std::max(half, std::min(children_triangles * 63 / 100, wanted)));
+    const uint64_t wanted =
+        level < kTopLevels ? std::min(kSmallTopPatch, patch_triangles / 2) : patch_triangles / 2;
+    uint64_t quota = std::max(half, std::min(children_triangles * 63 / 100, wanted));
+    // The roots, six at most, are what is resident always and drawn first.
+    if (level == 0) quota = std::min<uint64_t>(quota, patch_triangles / 4);
+    return uint32_t(std::max(quota, std::min<uint64_t>(children_triangles, kSmallestPatch)));
 }
 
 void DiamondWorker::addCell(const CellMesh& child, uint8_t label) {
@@ -71,7 +76,12 @@ void DiamondWorker::merge(const DiamondInput& input) {
 void DiamondWorker::run(const DiamondInput& input, DiamondOutput& output) {
     merge(input);
     output.input_triangles = merged_.mesh.triangleCount();
-    CHECK_LT(size_t(0), merged_.mesh.triangleCount());
+    if (merged_.mesh.triangle.empty()) {  // its children kept nothing of what they had to show
+        output = DiamondOutput{};
+        output.cells.resize(input.children.size());
+        output.error = input.child_error;
+        return;
+    }
     SimplifyInput simplify;
     simplify.mesh = &merged_.mesh;
     simplify.cell = label_;

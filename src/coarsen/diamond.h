@@ -1,7 +1,7 @@
 #pragma once
 // One diamond of the hierarchy made coarser (Cignoni et al. 2004, section 5.2): the meshes of its
-// cells' children are merged into one, simplified with the outer border locked, each cell to its own
-// quota, bounded, and taken apart into cells again. Deterministic; one worker a thread.
+// cells' children are merged into one, simplified with the outer border locked, each cell to its
+// own quota, bounded, and taken apart into cells again. Deterministic; one worker a thread.
 
 #include <cstdint>
 #include <span>
@@ -51,8 +51,9 @@ private:
     std::vector<uint32_t> local_;  // per simplified vertex: its number in the cell at hand
 };
 
-/// Triangles that a cell with `children_triangles` below it is to keep: half of them, but not much
-/// below `patch_triangles` / 2 but at the coarsest levels.
+/// Triangles that a cell with `children_triangles` below it is to keep: half of them, or 63 % once
+/// that comes below `patch_triangles` / 2, a size at which a surface's cells then stay from level to
+/// level. The coarsest levels are few and go lower; a root keeps at most `patch_triangles` / 4.
 uint32_t cellQuota(uint64_t children_triangles, uint32_t patch_triangles, int level);
 
 }  // namespace pietra

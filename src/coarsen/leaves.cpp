@@ -97,7 +97,8 @@ private:
     std::mutex mutex_;
 };
 
-/// Cuts leaves out of buckets. A leaf is a run of triangles of one bucket, or of several whole ones.
+/// Cuts leaves out of buckets. A leaf is a run of triangles of one bucket, or of several whole
+/// ones.
 class LeafCutter {
 public:
     LeafCutter(const VertexRecord& record, float bound) : record_(record), bound_(bound) {}
@@ -105,7 +106,8 @@ public:
     /// Appends the triangles of `bucket` that lie in the cell.
     void add(const BucketMesh& bucket, CellId cell) {
         const Mesh& mesh = bucket.mesh;
-        const size_t begin = findPath(mesh, firstPath(cell)), end = findPath(mesh, lastPath(cell) + 1);
+        const size_t begin = findPath(mesh, firstPath(cell)),
+                     end = findPath(mesh, lastPath(cell) + 1);
         for (size_t t = begin; t < end; ++t) {
             Triangle triangle;
             for (size_t k = 0; k < 3; ++k) triangle[k] = addVertex(mesh, mesh.triangle[t][k]);
@@ -132,8 +134,10 @@ private:
         if (path == 0) return 0;
         while (low < high) {
             const size_t middle = (low + high) / 2;
-            if (trianglePath(mesh, middle) < path) low = middle + 1;
-            else high = middle;
+            if (trianglePath(mesh, middle) < path)
+                low = middle + 1;
+            else
+                high = middle;
         }
         return low;
     }
@@ -187,9 +191,9 @@ Leaves buildLeaves(Partition& partition, const VertexRecord& record, const LeafS
     // Tasks: runs of leaves that begin in the same bucket.
     const std::vector<CellId>& order = leaves.tree->leaves();
     const auto bucketAt = [&](CellPath path) {
-        const auto after = std::upper_bound(
-            buckets.begin(), buckets.end(), path,
-            [](CellPath a, const Bucket& b) { return a < firstPath(b.cell); });
+        const auto after =
+            std::upper_bound(buckets.begin(), buckets.end(), path,
+                             [](CellPath a, const Bucket& b) { return a < firstPath(b.cell); });
         return after == buckets.begin() ? size_t(0) : size_t(after - buckets.begin()) - 1;
     };
     std::vector<std::pair<size_t, size_t>> runs;  // of leaves

@@ -1,6 +1,6 @@
 #pragma once
-// From buckets to leaf cells: welds every bucket, lets buckets tell each other what they know, builds
-// and closes the tree of cells, and stores each leaf's mesh. Two passes over the buckets, in
+// From buckets to leaf cells: welds every bucket, lets buckets tell each other what they know,
+// builds and closes the tree of cells, and stores each leaf's mesh. Two passes over the buckets, in
 // parallel; memory O(a bucket) a thread, plus the tree.
 
 #include <memory>
@@ -25,9 +25,7 @@ struct Leaves {
     uint64_t duplicates = 0;
     EdgeCounts edges;
     /// Every edge of the input is used by exactly two triangles of opposite winding.
-    bool isClosed() const {
-        return edges.border + edges.non_manifold + edges.inconsistent == 0;
-    }
+    bool isClosed() const { return edges.border + edges.non_manifold + edges.inconsistent == 0; }
 };
 
 /// Consumes the partition's records. `store` receives the leaves' meshes.

@@ -29,8 +29,9 @@ struct Partition::Dealer {
     Dealer(Partition& partition, CellId below, int level, size_t buffer_bytes)
         : partition(partition),
           level(level),
-          flush_bytes(std::clamp(buffer_bytes >> (below ? 3 : level),
-                                 size_t(4096), size_t(1) << 18)) {}
+          flush_bytes(
+              std::clamp(buffer_bytes >> std::min(below ? level - cellLevel(below) : level, 20),
+                         size_t(4096), size_t(1) << 18)) {}
 
     struct Buffers {
         std::vector<std::byte> own, ghost;
@@ -71,7 +72,8 @@ struct Partition::Dealer {
     void finish() {
         for (size_t b = 0; b < buckets.size(); ++b)
             for (bool ghost : {false, true}) flush(b, ghost);
-        for (Bucket& b : buckets)  // a cell with ghosts alone has nothing to say to anybody but them
+        for (Bucket& b :
+             buckets)  // a cell with ghosts alone has nothing to say to anybody but them
             if (b.own_count + b.ghost_count > 0) partition.buckets_.push_back(std::move(b));
     }
 
@@ -124,7 +126,8 @@ void Partition::Dealer::deal(std::span<const std::byte> records, bool ghosts_onl
         if (cell[0] == 0) continue;
         const std::byte* record = records.data() + t * record_bytes;
         if (!ghosts_only) append(bucketFor(cell[0]), false, record, record_bytes);
-        if (!ghosts_only && cell[1] == cell[0] && cell[2] == cell[0] && cell[3] == cell[0]) continue;
+        if (!ghosts_only && cell[1] == cell[0] && cell[2] == cell[0] && cell[3] == cell[0])
+            continue;
         std::byte ghost[kGhostRecordBytes];
         for (size_t k = 0; k < 3; ++k) std::memcpy(ghost + 8 * k, record + k * corner_bytes, 8);
         for (size_t k = 1; k < 4; ++k) {
@@ -166,8 +169,8 @@ Partition::Partition(TriangleSource& source, const VertexTable& vertices,
 void Partition::divideOversized(const PartitionSettings& settings, Progress& progress) {
     for (size_t b = 0; b < buckets_.size(); ++b) {
         if (buckets_[b].own_count <= settings.bucket_triangles) continue;
-        const int level = cellLevel(buckets_[b].cell) + 3;
-        if (level > kMaxCellLevel) continue;
+        const int level = std::min(cellLevel(buckets_[b].cell) + buckets_[b].step, kMaxCellLevel);
+        if (level == cellLevel(buckets_[b].cell)) continue;
         const Bucket big = std::move(buckets_[b]);
         buckets_[b] = Bucket{};  // dropped below
         Dealer dealer(*this, big.cell, level, settings.buffer_bytes);
@@ -180,6 +183,8 @@ void Partition::divideOversized(const PartitionSettings& settings, Progress& pro
                 dealer.deal(records, ghosts, bytes, big.cell);
                 progress.tick(0);
             }
+        // Where all went one way (many triangles around one point), the next step is longer.
+        if (dealer.buckets.size() == 1) dealer.buckets[0].step = 2 * big.step;
         dealer.finish();  // appended at the end: looked at again by this very loop
     }
     std::erase_if(buckets_, [](const Bucket& b) { return b.cell == 0; });
@@ -194,22 +199,12 @@ size_t Partition::bucketOf(const Vec3i& p, int scale) const {
     return size_t(after - buckets_.begin()) - 1;
 }
 
-std::vector<std::byte> Partition::readOwn(const Bucket& bucket) const {
-    std::vector<std::byte> records(bucket.own_count * own_bytes_);
+std::vector<std::byte> Partition::readChunks(const std::vector<Chunk>& chunks, uint64_t count,
+                                             size_t record_bytes) const {
+    std::vector<std::byte> records(count * record_bytes);
     size_t at = 0;
-    for (const Chunk& chunk : bucket.own) {
-        const size_t bytes = chunk.triangles * own_bytes_;
-        records_.read(chunk.position, std::span(records).subspan(at, bytes));
-        at += bytes;
-    }
-    return records;
-}
-
-std::vector<std::byte> Partition::readGhosts(const Bucket& bucket) const {
-    std::vector<std::byte> records(bucket.ghost_count * kGhostRecordBytes);
-    size_t at = 0;
-    for (const Chunk& chunk : bucket.ghost) {
-        const size_t bytes = chunk.triangles * kGhostRecordBytes;
+    for (const Chunk& chunk : chunks) {
+        const size_t bytes = chunk.triangles * record_bytes;
         records_.read(chunk.position, std::span(records).subspan(at, bytes));
         at += bytes;
     }

@@ -18,9 +18,9 @@ Lattice chooseLattice(const Box3d& box, const std::string& input_name,
     const Vec3d span = box.max - box.min;
     const double extent = std::max({span.x, span.y, span.z});
     if (!std::isfinite(extent) || (extent > 0 && extent < 1e-290))
-        throw InputError(input_name, "",
-                         fmt::format("the coordinates span {}, which no lattice of 21 bits can hold",
-                                     extent));
+        throw InputError(
+            input_name, "",
+            fmt::format("the coordinates span {}, which no lattice of 21 bits can hold", extent));
     Lattice lattice;
     lattice.origin = box.min;
     lattice.step = extent > 0 ? extent / kLatticeMax : 1;
@@ -135,7 +135,8 @@ void VertexTable::gather(std::span<const std::array<uint64_t, 3>> index,
         for (size_t u = begin; u < end; ++u) {
             const size_t b = used[u];
             const uint64_t first = uint64_t(b) * kBlockVertices;
-            block.resize(size_t(std::min<uint64_t>(kBlockVertices, count_ - first)) * record_.bytes);
+            block.resize(size_t(std::min<uint64_t>(kBlockVertices, count_ - first)) *
+                         record_.bytes);
             records_.read(first * record_.bytes, block);
             for (uint32_t i = start[b]; i < start[b + 1]; ++i) {
                 const uint32_t c = order[i];

@@ -1,7 +1,7 @@
 #pragma once
 // The input's vertices on the lattice: a table of fixed-size records in temporary space, from which
-// the corners of triangles are gathered. Two passes over the vertices (bounds, then records); memory
-// O(batch). The order and the content depend on the input alone.
+// the corners of triangles are gathered. Two passes over the vertices (bounds, then records);
+// memory O(batch). The order and the content depend on the input alone.
 
 #include <cstddef>
 #include <cstdint>

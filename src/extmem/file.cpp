@@ -158,9 +158,11 @@ AtomicFile::~AtomicFile() {
 void AtomicFile::commit() {
     file_.sync();
     file_.close();
-    if (std::rename(temporary_.c_str(), path_.c_str()) != 0) throw IoError(path_, "rename to", errno);
+    if (std::rename(temporary_.c_str(), path_.c_str()) != 0)
+        throw IoError(path_, "rename to", errno);
     committed_ = true;
-    // The rename itself must reach the disk too; a file system that cannot sync directories is fine.
+    // The rename itself must reach the disk too; a file system that cannot sync directories is
+    // fine.
     const int directory = ::open(directoryOf(path_).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (directory >= 0) {
         ::fsync(directory);

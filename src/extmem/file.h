@@ -15,8 +15,8 @@ public:
     enum class Mode { kRead, kCreate, kTemporary };
     File() = default;
     /// kRead: an existing regular file or pipe (a directory is refused). kCreate: truncated, for
-    /// writing and reading. kTemporary: as kCreate, unlinked at once, so that nothing is left behind;
-    /// `path` names the directory.
+    /// writing and reading. kTemporary: as kCreate, unlinked at once, so that nothing is left
+    /// behind; `path` names the directory.
     File(const std::string& path, Mode mode);
     File(File&& other) noexcept;
     File& operator=(File&& other) noexcept;
@@ -45,8 +45,8 @@ private:
     int descriptor_ = -1;
 };
 
-/// A file that appears under its name only when it is complete: written as NAME.part-PID, synced and
-/// renamed by commit(); removed by the destructor otherwise.
+/// A file that appears under its name only when it is complete: written as NAME.part-PID, synced
+/// and renamed by commit(); removed by the destructor otherwise.
 class AtomicFile {
 public:
     /// Throws UsageError if `path` exists and `force` is false, IoError if it cannot be created.

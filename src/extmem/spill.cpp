@@ -61,7 +61,8 @@ void Spill::read(uint64_t position, std::span<std::byte> data) const {
         return in_file_ && position >= file_base_;
     };
     if (inFile()) return file_.readAt(position - file_base_, data.data(), data.size());
-    // Blocks, once there, never move; only the table of them may, so it alone is read under the lock.
+    // Blocks, once there, never move; only the table of them may, so it alone is read under the
+    // lock.
     for (size_t done = 0; done < data.size();) {
         const std::byte* block;
         {

@@ -1,6 +1,6 @@
 #pragma once
-// Temporary data of a build: an append-only store that lies in memory as far as the budget allows and
-// in an unlinked file beyond. Positions are stable; any thread may append and read at any time.
+// Temporary data of a build: an append-only store that lies in memory as far as the budget allows
+// and in an unlinked file beyond. Positions are stable; any thread may append and read at any time.
 // What was appended is read back by position and size; there is no order between appends of
 // different threads.
 
@@ -21,8 +21,8 @@ namespace pietra {
 /// Where temporary data goes, and how much memory it may take.
 struct TempSpace {
     std::string directory;
-    Budget* budget = nullptr;      ///< memory taken from here, as long as...
-    size_t keep_free_bytes = 0;    ///< ...this much of it stays free for the work itself
+    Budget* budget = nullptr;             ///< memory taken from here, as long as...
+    size_t keep_free_bytes = 0;           ///< ...this much of it stays free for the work itself
     std::atomic<uint64_t> bytes{0};       ///< temporary bytes held now, in memory and in files
     std::atomic<uint64_t> peak_bytes{0};  ///< largest value of `bytes`
     void add(uint64_t more);
@@ -48,9 +48,10 @@ private:
     bool growMemory(uint64_t end);
     TempSpace* space_;
     mutable std::mutex mutex_;
-    std::vector<std::unique_ptr<std::byte[]>> blocks_;  // the first blocks_.size() * kBlock positions
+    std::vector<std::unique_ptr<std::byte[]>>
+        blocks_;  // the first blocks_.size() * kBlock positions
     std::vector<Reservation> reservations_;
-    File file_;              // positions from file_base_ on
+    File file_;  // positions from file_base_ on
     uint64_t file_base_ = 0;
     bool in_file_ = false;
     uint64_t end_ = 0;

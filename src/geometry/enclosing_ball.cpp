@@ -23,7 +23,8 @@ Ball circumscribed(const Vec3d* p, int count) {
     if (count == 0) return {};
     if (count == 1) return {p[0], 0};
     // centre = p0 + sum of l_i * q_i with q_i = p_i - p0, and 2 q_i . (centre - p0) = q_i . q_i:
-    // solved by elimination on the Gram matrix; a dependent point leaves a zero pivot and is skipped.
+    // solved by elimination on the Gram matrix; a dependent point leaves a zero pivot and is
+    // skipped.
     const int n = count - 1;
     double m[3][4];
     Vec3d q[3];
@@ -56,7 +57,8 @@ Ball smallest(std::vector<Vec3d>& points, size_t count, Vec3d* support, int supp
         if (ball.contains(points[i])) continue;
         support[support_count] = points[i];
         ball = smallest(points, i, support, support_count + 1);
-        std::rotate(points.begin(), points.begin() + ptrdiff_t(i), points.begin() + ptrdiff_t(i) + 1);
+        std::rotate(points.begin(), points.begin() + ptrdiff_t(i),
+                    points.begin() + ptrdiff_t(i) + 1);
     }
     return ball;
 }
@@ -111,8 +113,12 @@ Sphere enclosePoints(std::span<const V> points) {
 
 }  // namespace
 
-Sphere enclosingBall(std::span<const Vec3i> points) { return enclosePoints(points); }
-Sphere enclosingBall(std::span<const Vec3f> points) { return enclosePoints(points); }
+Sphere enclosingBall(std::span<const Vec3i> points) {
+    return enclosePoints(points);
+}
+Sphere enclosingBall(std::span<const Vec3f> points) {
+    return enclosePoints(points);
+}
 
 Sphere enclosingBall(std::span<const Sphere> balls) {
     Vec3d centre(0);
@@ -137,7 +143,8 @@ Sphere enclosingBall(std::span<const Sphere> balls) {
             any = true;
         }
     if (!any) return {};
-    // Start in the largest ball, step towards the farthest point with shrinking steps; keep the best.
+    // Start in the largest ball, step towards the farthest point with shrinking steps; keep the
+    // best.
     centre = Vec3d(largest->centre);
     Vec3d best = centre;
     double best_reach = farthest(centre, nullptr);

@@ -1,7 +1,8 @@
 #pragma once
-// Minimum enclosing balls: exact up to rounding for points (Welzl 1991 with the pivoting of Gaertner
-// 1999), within about a thousandth for balls (Badoiu, Clarkson 2003); as Cignoni et al. 2004,
-// section 5.2, use them. The spheres returned enclose their input whatever the rounding. Deterministic.
+// Minimum enclosing balls: exact up to rounding for points (Welzl 1991 with the pivoting of
+// Gaertner 1999), within about a thousandth for balls (Badoiu, Clarkson 2003); as Cignoni et al.
+// 2004, section 5.2, use them. The spheres returned enclose their input whatever the rounding.
+// Deterministic.
 
 #include <span>
 

@@ -42,7 +42,8 @@ TEST(EnclosingBall, ofBallsEnclosesThem) {
         for (Sphere& b : balls) b = {Vec3f(unit(random) * 100.0), radius(random)};
         const Sphere sphere = enclosingBall(balls);
         for (const Sphere& b : balls)
-            EXPECT_LE(glm::length(Vec3d(b.centre) - Vec3d(sphere.centre)) + b.radius, sphere.radius);
+            EXPECT_LE(glm::length(Vec3d(b.centre) - Vec3d(sphere.centre)) + b.radius,
+                      sphere.radius);
         EXPECT_LE(sphere.radius, 120.2);
     }
     const std::vector<Sphere> two = {{{0, 0, 0}, 1}, {{10, 0, 0}, 2}};
@@ -73,7 +74,8 @@ TEST(Octahedral, keepsDirections) {
 }
 
 TEST(Lattice, keysAreUniqueAndSnappingStaysInside) {
-    for (const Vec3i& p : {Vec3i(0), Vec3i(kLatticeMax), Vec3i(1, 2, 3), Vec3i(kLatticeMax, 0, 77)}) {
+    for (const Vec3i& p :
+         {Vec3i(0), Vec3i(kLatticeMax), Vec3i(1, 2, 3), Vec3i(kLatticeMax, 0, 77)}) {
         EXPECT_EQ(latticePoint(latticeKey(p)), p);
         for (int shift = 0; shift <= kMaxLatticeShift; ++shift) {
             const Vec3i q = snapToShift(p, shift);

@@ -2,9 +2,9 @@
 // The integer lattice on which every position of a model lives (docs/design/lattice.md).
 //
 // An input position p becomes the integer triple round((p - origin) / step), each in
-// [0, kLatticeMax]; equal triples are the same point. Cells of the tetrahedral hierarchy are cut from
-// the cube [0, 2^21]^3 of the same lattice. A model may use a coarser sub-lattice: then all its
-// vertices are multiples of 2^shift, and `step` stays that of the fine lattice.
+// [0, kLatticeMax]; equal triples are the same point. Cells of the tetrahedral hierarchy are cut
+// from the cube [0, 2^21]^3 of the same lattice. A model may use a coarser sub-lattice: then all
+// its vertices are multiples of 2^shift, and `step` stays that of the fine lattice.
 
 #include <cstdint>
 

@@ -21,8 +21,8 @@ struct Rgba8 {
     bool operator==(const Rgba8&) const = default;
 };
 
-/// Which attributes a model's vertices carry besides position and normal (every vertex has a normal:
-/// computed where the input has none).
+/// Which attributes a model's vertices carry besides position and normal (every vertex has a
+/// normal: computed where the input has none).
 struct AttributeSchema {
     bool normals_given = false;  ///< normals come from the input
     bool colours = false;
@@ -38,11 +38,11 @@ enum class EdgeClass : uint8_t { kManifold = 0, kBorder = 1, kTriple = 2, kMany 
 struct Mesh {
     std::vector<Vec3i> position;      ///< lattice units
     std::vector<Triangle> triangle;   ///< indices into position
-    std::vector<uint8_t> edge_class;  ///< one a triangle: bits 2k, 2k+1 are the EdgeClass of edge k,
-                                      ///< which joins corners k and (k+1)%3; bits 6, 7 are zero
-    std::vector<OctNormal> normal;    ///< one a vertex
-    std::vector<Rgba8> colour;        ///< one a vertex, or empty
-    std::vector<float> scalar;        ///< vertex-major, schema.scalars.size() a vertex
+    std::vector<uint8_t> edge_class;  ///< one a triangle: bits 2k, 2k+1 are the EdgeClass of edge
+                                      ///< k, which joins corners k and (k+1)%3; bits 6, 7 are zero
+    std::vector<OctNormal> normal;  ///< one a vertex
+    std::vector<Rgba8> colour;      ///< one a vertex, or empty
+    std::vector<float> scalar;      ///< vertex-major, schema.scalars.size() a vertex
 
     size_t vertexCount() const { return position.size(); }
     size_t triangleCount() const { return triangle.size(); }

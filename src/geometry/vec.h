@@ -1,11 +1,11 @@
 #pragma once
 // Vectors are GLM's. Positions on the lattice are Vec3i; input coordinates are Vec3d.
 
+#include <glm/ext/vector_int3_sized.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
-#include <glm/ext/vector_int3_sized.hpp>
 
 namespace pietra {
 

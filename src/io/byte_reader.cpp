@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 
 namespace pietra {
 
 ByteReader::ByteReader(std::unique_ptr<ByteSource> source)
-    : source_(std::move(source)), buffer_(kWindow + kPadding) {}
+    : source_(std::move(source)),
+      window_(size_t(std::min<uint64_t>(kWindow, source_->lengthBound()))) {}
 
 void ByteReader::seek(uint64_t offset) {
     if (offset >= base_ && offset - base_ <= end_) {
@@ -18,12 +20,19 @@ void ByteReader::seek(uint64_t offset) {
     }
 }
 
+void ByteReader::release() {
+    base_ += cursor_;
+    cursor_ = end_ = 0;
+    std::vector<uint8_t>().swap(buffer_);
+}
+
 void ByteReader::fill() {
+    if (buffer_.empty()) buffer_.resize(window_ + kPadding);
     std::memmove(buffer_.data(), data(), end_ - cursor_);
     base_ += cursor_;
     end_ -= cursor_;
     cursor_ = 0;
-    end_ += source_->read(base_ + end_, buffer_.data() + end_, kWindow - end_);
+    end_ += source_->read(base_ + end_, buffer_.data() + end_, window_ - end_);
     std::memset(buffer_.data() + end_, 0, kPadding);
 }
 

@@ -3,7 +3,8 @@
 //
 // The bytes from the cursor on lie in one piece, at least as many as were asked for (up to kWindow)
 // unless the file ends before. After the last byte of the file there are zero bytes in memory, so
-// that a scanner may look kPadding bytes ahead without asking. Memory: kWindow. Not thread-safe.
+// that a scanner may look kPadding bytes ahead without asking. Memory: kWindow, once read from. Not
+// thread-safe.
 
 #include <cstddef>
 #include <cstdint>
@@ -38,6 +39,8 @@ public:
     /// Moves the cursor over bytes that peek() has shown.
     void advance(size_t bytes) { cursor_ += bytes; }
     bool atEnd() { return peek(1) == 0; }
+    /// Gives the window's memory back until the next read; the cursor stays.
+    void release();
 
     /// "byte 17", or "byte 17 of the unpacked data", for messages.
     std::string placeOf(uint64_t offset) const;
@@ -46,6 +49,7 @@ private:
     void fill();
 
     std::unique_ptr<ByteSource> source_;
+    size_t window_;  ///< kWindow, or the whole of a smaller file
     std::vector<uint8_t> buffer_;
     uint64_t base_ = 0;  ///< offset of buffer_[0]
     size_t cursor_ = 0;

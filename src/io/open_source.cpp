@@ -79,7 +79,10 @@ public:
     }
     bool readVertices(VertexBatch& batch) override {
         for (; vertex_part_ < parts_.size(); ++vertex_part_) {
-            if (!parts_[vertex_part_]->readVertices(batch)) continue;
+            if (!parts_[vertex_part_]->readVertices(batch)) {
+                parts_[vertex_part_]->rewindVertices();  // which frees its memory
+                continue;
+            }
             batch.first += first_vertex_[vertex_part_];
             if (!schema_.normals_given) batch.normal.clear();
             if (!schema_.colours) batch.colour.clear();
@@ -96,7 +99,10 @@ public:
     }
     bool readTriangles(TriangleBatch& batch) override {
         for (; triangle_part_ < parts_.size(); ++triangle_part_) {
-            if (!parts_[triangle_part_]->readTriangles(batch)) continue;
+            if (!parts_[triangle_part_]->readTriangles(batch)) {
+                parts_[triangle_part_]->rewindTriangles();  // which frees its memory
+                continue;
+            }
             batch.first = triangles_read_;
             triangles_read_ += batch.triangle.size();
             const uint64_t shift = first_vertex_[triangle_part_];

@@ -66,11 +66,13 @@ PlyFaceReader::PlyFaceReader(PlyCursor& cursor, const PlyElement& element, uint6
     if (colours) schema_notes_.push_back("colours of faces are left out");
 
     if (list->type == PlyType::kUint32) restart_ = int64_t(0xffffffff);
-    has_triangle_rows_ = !is_strips_ && !cursor.isAscii() && lists == 1 &&
-                         sizeOf(list->count_type) == 1 && sizeOf(list->type) == 4;
-    triangle_row_bytes_ = bytes_before_ + 1 + 12 + bytes_after;
+    has_plain_rows_ = !is_strips_ && !cursor.isAscii() && lists == 1 &&
+                      sizeOf(list->count_type) == 1 && sizeOf(list->type) == 4;
+    bytes_around_ = bytes_before_ + 1 + bytes_after;
     index_limit_ = std::min<uint64_t>(
         vertex_count, list->type == PlyType::kInt32 ? uint64_t(1) << 31 : uint64_t(1) << 32);
+    corner_limit_ =
+        std::min<uint64_t>(vertex_count, list->count_type == PlyType::kInt8 ? 127 : 255);
 }
 
 void PlyFaceReader::start() {
@@ -89,43 +91,87 @@ std::vector<std::string> PlyFaceReader::notes() const {
     return notes;
 }
 
-bool PlyFaceReader::read(TriangleBatch& batch) {
-    readRows(batch.triangle);
+bool PlyFaceReader::read(TriangleRoom& out) {
+    readRows(out);
     row_ = cursor_.row();
     return !rowsLeft();
 }
 
-void PlyFaceReader::readRows(Triangles& out) {
-    while (out.size() < kMaxBatch) {
-        if (!in_row_ && has_triangle_rows_) readTriangleRows(out);
-        if (out.size() == kMaxBatch) break;
-        if (!rowsLeft()) return;
+void PlyFaceReader::readRows(TriangleRoom& out) {
+    while (out.left() > 0) {
+        if (!in_row_ && has_plain_rows_) readPlainRows(out);
+        if (out.left() == 0 || !rowsLeft()) return;
         if (!in_row_) beginRow();
         readItems(out);
         if (list_left_ == 0) endRow();
     }
 }
 
-/// The fast path: stops at the first row that is not a triangle with good indices.
-void PlyFaceReader::readTriangleRows(Triangles& out) {
+/// The fast path: stops at the first row that is faulty or does not fit the window or the room, for
+/// the general path to take it.
+void PlyFaceReader::readPlainRows(TriangleRoom& out) {
     ByteReader& reader = cursor_.reader();
-    while (out.size() < kMaxBatch) {
-        const size_t whole = reader.peek(triangle_row_bytes_) / triangle_row_bytes_;
-        const auto most = size_t(
-            std::min<uint64_t>({whole, kMaxBatch - out.size(), element_.count - cursor_.row()}));
-        if (most == 0) return;
-        const size_t begin = out.size();
-        out.resize(begin + most);
+    const size_t triangle_bytes = bytes_around_ + 12;
+    while (out.left() > 0 && cursor_.row() < element_.count) {
+        const size_t available = reader.peek(triangle_bytes);
+        if (available < triangle_bytes) return;
         const uint8_t* row = reader.data() + bytes_before_;
+        if (*row != 3) {
+            const size_t done = decodePolygons(row, available - bytes_before_, out);
+            if (done == 0) return;
+            reader.advance(done);
+            continue;
+        }
+        const auto most = size_t(std::min<uint64_t>(
+            {available / triangle_bytes, out.left(), element_.count - cursor_.row()}));
+        std::array<uint64_t, 3>* to = out.data + out.size;
         const size_t done =
             cursor_.swapsBytes()
-                ? decodeTriangles<true>(row, triangle_row_bytes_, most, index_limit_, &out[begin])
-                : decodeTriangles<false>(row, triangle_row_bytes_, most, index_limit_, &out[begin]);
-        out.resize(begin + done);
-        reader.advance(done * triangle_row_bytes_);
+                ? decodeTriangles<true>(row, triangle_bytes, most, index_limit_, to)
+                : decodeTriangles<false>(row, triangle_bytes, most, index_limit_, to);
+        out.size += done;
+        reader.advance(done * triangle_bytes);
         cursor_.countRows(done);
-        if (done < most) return;
+        if (done == 0) return;
     }
+}
+
+/// Decodes rows of four or more indices; `row` points at the count of the first one, and `bytes`
+/// follow. Returns how many bytes were taken.
+size_t PlyFaceReader::decodePolygons(const uint8_t* row, size_t bytes, TriangleRoom& out) {
+    const auto index = [&](const uint8_t* at) {
+        return cursor_.swapsBytes() ? loadValue<uint32_t, true>(at)
+                                    : loadValue<uint32_t, false>(at);
+    };
+    const uint64_t rows_left = element_.count - cursor_.row();
+    const size_t bytes_after = bytes_around_ - bytes_before_ - 1;
+    size_t taken = 0;
+    uint64_t rows = 0;
+    for (; rows < rows_left && taken < bytes; ++rows) {
+        const size_t corners = row[taken];
+        // note: the next row's first fields may lie beyond `bytes`, its count must not.
+        const size_t row_bytes = 1 + 4 * corners + bytes_after;
+        if (corners < 4 || corners > corner_limit_ || corners - 2 > out.left() ||
+            row_bytes > bytes - taken)
+            break;
+        const uint8_t* items = row + taken + 1;
+        uint64_t first = index(items), previous = index(items + 4);
+        uint64_t largest = std::max(first, previous);
+        for (size_t k = 2; k < corners; ++k) {
+            const uint64_t next = index(items + 4 * k);
+            largest = std::max(largest, next);
+            out.add(first, previous, next);
+            previous = next;
+        }
+        if (largest >= index_limit_) {
+            out.size -= corners - 2;
+            break;
+        }
+        taken += row_bytes + bytes_before_;
+    }
+    polygons_ += rows;
+    cursor_.countRows(rows);
+    return taken;
 }
 
 void PlyFaceReader::beginRow() {
@@ -147,9 +193,9 @@ void PlyFaceReader::beginRow() {
     if (list_left_ < 3) ++small_faces_;
 }
 
-void PlyFaceReader::readItems(Triangles& out) {
+void PlyFaceReader::readItems(TriangleRoom& out) {
     const PlyProperty& list = element_.properties[list_property_];
-    for (; list_left_ > 0 && out.size() < kMaxBatch; --list_left_) {
+    for (; list_left_ > 0 && out.left() > 0; --list_left_) {
         const PlyPlace here = cursor_.place();
         const int64_t index = cursor_.nextInteger(list, list.type);
         if (is_strips_ && (index == -1 || index == restart_)) {
@@ -173,19 +219,19 @@ void PlyFaceReader::endRow() {
     in_row_ = false;
 }
 
-void PlyFaceReader::addFaceCorner(uint64_t index, Triangles& out) {
-    if (corners_ >= 2) out.push_back({a_, b_, index});
+void PlyFaceReader::addFaceCorner(uint64_t index, TriangleRoom& out) {
+    if (corners_ >= 2) out.add(a_, b_, index);
     if (corners_ == 0) a_ = index;
     b_ = index;
     ++corners_;
 }
 
-void PlyFaceReader::addStripCorner(uint64_t index, Triangles& out) {
+void PlyFaceReader::addStripCorner(uint64_t index, TriangleRoom& out) {
     if (corners_ >= 2 && a_ != b_ && a_ != index && b_ != index) {
         if (corners_ % 2 == 0)
-            out.push_back({a_, b_, index});
+            out.add(a_, b_, index);
         else
-            out.push_back({b_, a_, index});
+            out.add(b_, a_, index);
     }
     a_ = b_;
     b_ = index;

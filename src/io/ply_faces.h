@@ -16,6 +16,16 @@
 
 namespace pietra {
 
+/// Where triangles are put: room for a batch, filled from the front. (A vector would be cleared
+/// before each batch only to be overwritten, which costs as much as the decoding.)
+struct TriangleRoom {
+    std::array<uint64_t, 3>* data = nullptr;
+    size_t capacity = 0;
+    size_t size = 0;
+    size_t left() const { return capacity - size; }
+    void add(uint64_t a, uint64_t b, uint64_t c) { data[size++] = {a, b, c}; }
+};
+
 class PlyFaceReader {
 public:
     /// `element` must outlive this. Throws InputError where it has no list of vertex indices.
@@ -30,19 +40,19 @@ public:
     void start();
     /// Rows read whole since start(); where reading goes on, the cursor's beginRows() must be told.
     uint64_t row() const { return row_; }
-    /// Appends triangles until `batch` has kMaxBatch or the element ends. True where it has ended.
-    bool read(TriangleBatch& batch);
+    /// Adds triangles until there is no room or the element ends. True where it has ended.
+    bool read(TriangleRoom& out);
 
 private:
-    using Triangles = std::vector<std::array<uint64_t, 3>>;
     bool rowsLeft() const { return list_left_ > 0 || in_row_ || cursor_.row() < element_.count; }
-    void readRows(Triangles& out);
-    void readTriangleRows(Triangles& out);
+    void readRows(TriangleRoom& out);
+    void readPlainRows(TriangleRoom& out);
+    size_t decodePolygons(const uint8_t* row, size_t bytes, TriangleRoom& out);
     void beginRow();
-    void readItems(Triangles& out);
+    void readItems(TriangleRoom& out);
     void endRow();
-    void addFaceCorner(uint64_t index, Triangles& out);
-    void addStripCorner(uint64_t index, Triangles& out);
+    void addFaceCorner(uint64_t index, TriangleRoom& out);
+    void addStripCorner(uint64_t index, TriangleRoom& out);
 
     PlyCursor& cursor_;
     const PlyElement& element_;
@@ -52,11 +62,12 @@ private:
     int64_t restart_ = -1;  ///< the index that starts a new strip, beside -1
     std::vector<std::string> schema_notes_;
 
-    // Rows that are one list of three 32-bit indices between fixed fields.
-    bool has_triangle_rows_ = false;
+    // Rows that are one list, with a count of 8 and indices of 32 bits, between fixed fields.
+    bool has_plain_rows_ = false;
     size_t bytes_before_ = 0;
-    size_t triangle_row_bytes_ = 0;
+    size_t bytes_around_ = 0;  ///< all but the indices
     uint64_t index_limit_ = 0;
+    uint64_t corner_limit_ = 0;
 
     uint64_t row_ = 0;
     // The state inside a row.

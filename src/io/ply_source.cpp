@@ -44,6 +44,7 @@ public:
         }
         starts_[0] = PlyPlace{header_.body_offset, header_.body_line};
         checkCounts();
+        reader_->release();
     }
 
     const AttributeSchema& schema() const override { return vertices_.schema(); }
@@ -55,7 +56,10 @@ public:
     }
     std::vector<std::string> notes() const override;
 
-    void rewindVertices() override { vertices_read_ = 0; }
+    void rewindVertices() override {
+        vertices_read_ = 0;
+        reader_->release();
+    }
     bool readVertices(VertexBatch& batch) override;
     void rewindTriangles() override;
     bool readTriangles(TriangleBatch& batch) override;
@@ -163,6 +167,7 @@ bool PlySource::readVertices(VertexBatch& batch) {
 void PlySource::rewindTriangles() {
     triangles_read_ = face_reader_ = 0;
     in_faces_ = false;
+    reader_->release();
 }
 
 size_t PlySource::elementOf(size_t face_reader) const {
@@ -173,8 +178,10 @@ size_t PlySource::elementOf(size_t face_reader) const {
 
 bool PlySource::readTriangles(TriangleBatch& batch) {
     batch.first = triangles_read_;
-    batch.triangle.clear();
-    while (face_reader_ < faces_.size() && batch.triangle.size() < kMaxBatch) {
+    // A triangle takes some bytes, so a small file needs no large batch.
+    batch.triangle.resize(size_t(std::min<uint64_t>(kMaxBatch, reader_->source().lengthBound())));
+    TriangleRoom room{batch.triangle.data(), batch.triangle.size(), 0};
+    while (face_reader_ < faces_.size() && room.left() > 0) {
         const size_t element = elementOf(face_reader_);
         if (!in_faces_) {
             goTo(element);
@@ -184,15 +191,16 @@ bool PlySource::readTriangles(TriangleBatch& batch) {
             cursor_.seek(face_place_);
             cursor_.beginRows(header_.elements[element], faces_[face_reader_].row());
         }
-        const bool ended = faces_[face_reader_].read(batch);
+        const bool ended = faces_[face_reader_].read(room);
         face_place_ = cursor_.place();
         if (!ended) break;
         starts_[element + 1] = face_place_;
         ++face_reader_;
         in_faces_ = false;
     }
-    triangles_read_ += batch.triangle.size();
-    if (!batch.triangle.empty()) return true;
+    batch.triangle.resize(room.size);
+    triangles_read_ += room.size;
+    if (room.size > 0) return true;
     if (triangles_read_ == 0)
         throw InputError(reader_->path(), "",
                          "has no face of three corners or more: nothing to show");

@@ -150,7 +150,7 @@ std::string gzipped(const std::string& text) {
 
 TEST(PlySource, readsPositionsAndTrianglesExactly) {
     const ScratchDirectory dir;
-    const Grid grid{300};  // more vertices and triangles than a batch holds
+    const Grid grid{260};  // more vertices and triangles than a batch holds
     const WholeMesh mesh = readWhole(dir.write("a.ply", plainGrid(grid, PlyBuilder::kLittle)));
     ASSERT_EQ(mesh.vertices.position.size(), grid.vertexCount());
     for (uint64_t v = 0; v < grid.vertexCount(); ++v)
@@ -329,6 +329,43 @@ TEST(PlySource, fansLongPolygonsAcrossBatches) {
     }
 }
 
+/// Faces of 1 to 9 corners, mixed at random, between other properties; larger than window and
+/// batch.
+std::string mixedPolygons(PlyBuilder::Encoding encoding, const std::string& count_type, int faces) {
+    const int vertices = 1000;
+    PlyBuilder ply(encoding);
+    ply.line("element vertex " + std::to_string(vertices));
+    for (const char* name : {"x", "y", "z"}) ply.line(std::string("property char ") + name);
+    ply.line("element face " + std::to_string(faces)).line("property short before");
+    ply.line("property list " + count_type + " int vertex_indices").line("property uchar after");
+    ply.line("end_header");
+    for (int v = 0; v < vertices; ++v)
+        ply.value(int8_t(v)).value(int8_t(1)).value(int8_t(2)).endRow();
+    for (int f = 0; f < faces; ++f) {
+        const uint64_t random = mixBits(uint64_t(f));
+        const int corners = random % 2 ? 3 : 1 + int(random / 2 % 9);
+        ply.value(int16_t(f)).typed(count_type, corners);
+        for (int k = 0; k < corners; ++k) ply.value(int(mixBits(random + uint64_t(k)) % vertices));
+        ply.value(uint8_t(f)).endRow();
+    }
+    return ply.text();
+}
+
+TEST(PlySource, mixedPolygonsAreTheSameInEveryForm) {
+    const ScratchDirectory dir;
+    const int faces = 80000;
+    const WholeMesh expected =
+        readWhole(dir.write("a.ply", mixedPolygons(PlyBuilder::kAscii, "int", faces)));
+    EXPECT_GT(expected.triangles.size(), 2 * kMaxBatch);
+    for (const auto encoding : kEncodings)
+        for (const char* count_type : {"uchar", "char", "ushort"}) {
+            const WholeMesh mesh =
+                readWhole(dir.write("b.ply", mixedPolygons(encoding, count_type, faces)));
+            expectSameMesh(mesh, expected);
+            EXPECT_EQ(mesh.notes, expected.notes);
+        }
+}
+
 TEST(PlySource, unrollsStrips) {
     const ScratchDirectory dir;
     for (const auto encoding : kEncodings)
@@ -361,7 +398,7 @@ TEST(PlySource, unrollsStrips) {
 
 TEST(PlySource, streamsCanBeReadInAnyOrderAgain) {
     const ScratchDirectory dir;
-    const Grid grid{300};
+    const Grid grid{260};
     for (const auto encoding : kEncodings) {
         const std::string text = plainGrid(grid, encoding);
         for (const std::string& path :
@@ -401,6 +438,27 @@ TEST(PlySource, joinsFiles) {
     const WholeMesh twice = readWhole(*openSource({b, b}));
     EXPECT_EQ(twice.schema.scalars.size(), 2u);
     EXPECT_EQ(twice.vertices.scalar.size(), 16u);
+}
+
+TEST(PlySource, joinsManyFilesInTheMemoryOfOne) {
+    const ScratchDirectory dir;
+    const std::string path = dir.write("a.ply", plainGrid(Grid{250}, PlyBuilder::kLittle));
+    const std::vector<std::string> paths(40, path);
+    const size_t before = residentBytes();
+    const auto source = openSource(paths);
+    VertexBatch vertices;
+    TriangleBatch triangles;
+    size_t most = residentBytes();
+    uint64_t count = 0;
+    while (source->readVertices(vertices)) most = std::max(most, residentBytes());
+    while (source->readTriangles(triangles)) {
+        most = std::max(most, residentBytes());
+        count += triangles.triangle.size();
+    }
+    EXPECT_EQ(count, 40u * 125000);
+#ifndef __SANITIZE_ADDRESS__  // which keeps freed memory for a while
+    EXPECT_LT(most, before + (size_t(12) << 20));
+#endif
 }
 
 const char kVertexHeader[] =
@@ -519,6 +577,25 @@ TEST(PlySource, namesFaultsOfBinaryFilesByOffset) {
                   at(good.size()) + "the file ends within element face, after 31 of 32 rows");
         EXPECT_EQ(faultWith(faces, "\xff"),
                   at(faces) + "a face of 255 corners in a mesh of 25 vertices");
+    }
+}
+
+TEST(PlySource, checksEveryIndexOfEveryPolygon) {
+    const ScratchDirectory dir;
+    const int faces = 300;
+    const std::string good = mixedPolygons(PlyBuilder::kLittle, "uchar", faces);
+    size_t at = good.find("end_header\n") + 11 + 1000 * 3;
+    for (int f = 0; f < faces; ++f) {
+        const size_t corners = uint8_t(good[at + 2]);
+        for (size_t k = 0; k < corners; ++k) {
+            std::string bad = good;
+            const size_t place = at + 3 + 4 * k;
+            bad.replace(place, 4, std::string("\xe8\x03\0\0", 4));
+            const std::string path = dir.write("bad.ply", bad);
+            ASSERT_EQ(faultOf(path), path + ": byte " + std::to_string(place) +
+                                         ": vertex index 1000 in a mesh of 1000 vertices");
+        }
+        at += 2 + 1 + 4 * corners + 1;
     }
 }
 

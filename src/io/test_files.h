@@ -28,6 +28,8 @@ public:
     std::string path() const { return path_.string(); }
     /// Writes `bytes` to a file and returns its path.
     std::string write(const std::string& name, const std::string& bytes) const {
+        // note: truncating a file that exists makes some file systems write it out at once.
+        std::filesystem::remove(file(name));
         std::ofstream(file(name), std::ios::binary) << bytes;
         return file(name);
     }

@@ -12,7 +12,9 @@ constexpr Method kMethods[] = {
 
 }  // namespace
 
-std::span<const Method> methods() { return kMethods; }
+std::span<const Method> methods() {
+    return kMethods;
+}
 
 const Method* findMethod(std::string_view name) {
     for (const Method& method : kMethods)

@@ -84,4 +84,27 @@ Camera standardCamera(StandardView view, UpAxis up_axis, const Box3d& box, const
     return {centre - distance * direction.forward, centre, direction.up, fovy_deg};
 }
 
+Camera movedCloser(const Camera& camera, std::span<const Sphere> balls, const PictureSize& size) {
+    const double tan_y = std::tan(camera.fovy_deg * std::numbers::pi / 360) * (1 - kMargin);
+    const double tan_x = tan_y * size.width / size.height;
+    const double now = glm::length(camera.target - camera.eye);
+    const Vec3d forward = (camera.target - camera.eye) / now;
+    const Vec3d right = glm::normalize(glm::cross(forward, camera.up));
+    const Vec3d up = glm::cross(right, forward);
+    double distance = 0;
+    for (const Sphere& ball : balls) {
+        const Vec3d offset = Vec3d(ball.centre) - camera.target;
+        // A side plane of slope t is a ball's radius away where depth is r sqrt(1 + t^2) / t more.
+        const double x = (std::abs(glm::dot(offset, right)) +
+                          ball.radius * std::sqrt(1 + tan_x * tan_x)) / tan_x;
+        const double y = (std::abs(glm::dot(offset, up)) +
+                          ball.radius * std::sqrt(1 + tan_y * tan_y)) / tan_y;
+        const double before = -glm::dot(offset, forward);
+        distance = std::max({distance, before + std::max(x, y), 1.05 * (before + ball.radius)});
+    }
+    Camera closer = camera;
+    if (distance > 0 && distance < now) closer.eye = camera.target - distance * forward;
+    return closer;
+}
+
 }  // namespace pietra

@@ -3,6 +3,7 @@
 // bottom, or a corner (iso), so that a whole box is in the picture. Pure functions.
 
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include "multires/view.h"
@@ -24,5 +25,10 @@ std::optional<StandardView> parseStandardView(std::string_view name);
 /// empty; one that is a single point is looked at from a distance of 1.
 Camera standardCamera(StandardView view, UpAxis up_axis, const Box3d& box, const PictureSize& size,
                       double fovy_deg = 45);
+
+/// The same camera, moved along its axis to the least distance from its target at which all `balls`
+/// (input coordinates) lie inside the picture with the same margin, if that is nearer: a model need
+/// not reach into the corners of its box.
+Camera movedCloser(const Camera& camera, std::span<const Sphere> balls, const PictureSize& size);
 
 }  // namespace pietra

@@ -94,5 +94,22 @@ TEST(StandardViews, namesAreParsed) {
     EXPECT_EQ(parseStandardView(""), std::nullopt);
 }
 
+TEST(StandardViews, movedCloserKeepsTheBallsInThePicture) {
+    const Box3d box{{-1, -1, -1}, {1, 1, 1}};
+    const PictureSize size{640, 480};
+    const Camera far = standardCamera(StandardView::kIso, UpAxis::kZ, box, size);
+    const Sphere ball{{0, 0, 0}, 1};
+    const Camera near = movedCloser(far, std::span(&ball, 1), size);
+    EXPECT_LT(glm::length(near.eye), 0.7 * glm::length(far.eye));
+    // The ball's outline stays inside, and would not with a tenth less.
+    const double sine = 1 / glm::length(near.eye);
+    const double tan_y = std::tan(near.fovy_deg * 3.14159265 / 360);
+    EXPECT_LT(sine / std::sqrt(1 - sine * sine), tan_y);
+    EXPECT_GT(sine * 1.1 / std::sqrt(1 - sine * sine * 1.21), tan_y);
+    EXPECT_EQ(movedCloser(near, std::span(&ball, 1), size).eye, near.eye);
+    const Sphere large{{0, 0, 0}, 10};  // never further away
+    EXPECT_EQ(movedCloser(far, std::span(&large, 1), size).eye, far.eye);
+}
+
 }  // namespace
 }  // namespace pietra

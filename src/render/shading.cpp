@@ -29,14 +29,19 @@ double decodeSrgb(double srgb) {
 
 struct Tables {
     std::array<float, 256> linear;
-    std::array<uint8_t, kSrgbEntries> srgb;
+    std::array<uint16_t, 256> linear_units;
+    std::array<uint8_t, kSrgbEntries> srgb, plain;
     Tables() {
-        for (int i = 0; i < 256; ++i) linear[i] = float(decodeSrgb(i / 255.0));
+        for (int i = 0; i < 256; ++i) {
+            linear[i] = float(decodeSrgb(i / 255.0));
+            linear_units[i] = uint16_t(decodeSrgb(i / 255.0) * kLinearUnits + 0.5);
+        }
         int byte = 0;
         for (int i = 0; i < kSrgbEntries; ++i) {
             while (byte < 255 && double(i) / (kSrgbEntries - 1) > decodeSrgb((byte + 0.5) / 255))
                 ++byte;
             srgb[i] = uint8_t(byte);
+            plain[i] = uint8_t((i * 255 * 2 + kSrgbEntries - 1) / (2 * (kSrgbEntries - 1)));
         }
     }
 };
@@ -70,8 +75,11 @@ Vec3f fromHue(float hue, float saturation, float value) {
 const uint8_t* srgbTable() {
     return tables().srgb.data();
 }
-const float* linearTable() {
-    return tables().linear.data();
+const uint8_t* plainTable() {
+    return tables().plain.data();
+}
+const uint16_t* linearUnitTable() {
+    return tables().linear_units.data();
 }
 
 float linearFromSrgb(float srgb) {
@@ -79,7 +87,7 @@ float linearFromSrgb(float srgb) {
 }
 
 float linearFromSrgb(uint8_t srgb) {
-    return linearTable()[srgb];
+    return tables().linear[srgb];
 }
 
 Vec3f linearFromSrgb(const Rgba8& srgb) {
@@ -141,11 +149,20 @@ Vec3f patchColour(const ShadeSettings& settings, const DrawPatch& patch) {
     }
 }
 
-Vec3f backgroundColour(const ShadeSettings& settings, int y, int height) {
+std::array<Rgba8, 4> backgroundRow(const ShadeSettings& settings, int y, int height) {
+    static constexpr int kBayer[4][4] = {
+        {0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
     const float t = height > 1 ? float(y) / float(height - 1) : 0;
-    const Vec3f top = linearFromSrgb(settings.background_top);
-    const Vec3f bottom = linearFromSrgb(settings.background_bottom);
-    return top * (1 - t) + bottom * t;
+    std::array<Rgba8, 4> row;
+    for (int x = 0; x < 4; ++x) {
+        const float threshold = (float(kBayer[y & 3][x]) + 0.5f) / 16;
+        const auto mix = [&](uint8_t top, uint8_t bottom) {
+            return uint8_t(float(top) * (1 - t) + float(bottom) * t + threshold);
+        };
+        const Rgba8 &top = settings.background_top, &bottom = settings.background_bottom;
+        row[size_t(x)] = {mix(top.r, bottom.r), mix(top.g, bottom.g), mix(top.b, bottom.b), 255};
+    }
+    return row;
 }
 
 }  // namespace pietra

@@ -3,6 +3,7 @@
 // views, and the step between linear light and the sRGB bytes of a picture. Only +, -, *, / and
 // sqrt, so that a picture's bytes are the same on every machine.
 
+#include <array>
 #include <cstdint>
 
 #include "geometry/mesh.h"
@@ -27,7 +28,7 @@ enum class Show {
 struct ShadeSettings {
     Show show = Show::kShaded;
     /// Towards the one light, in view space: right, up, towards the viewer. Any length but zero.
-    Vec3d light_direction{-0.45, 0.65, 0.6};
+    Vec3d light_direction{-0.6, 0.6, 0.53};
     /// Draw and light every patch from both sides, whatever its `one_sided` says.
     bool two_sided = false;
 
@@ -56,8 +57,11 @@ Rgba8 srgbFromLinear(const Vec3f& linear);
 /// The table behind srgbFromLinear: entry round(x * (kSrgbEntries - 1)) for x in [0, 1].
 inline constexpr int kSrgbEntries = 8192;
 const uint8_t* srgbTable();
-/// The 256 entries behind linearFromSrgb of bytes.
-const float* linearTable();
+/// As long, for what is no light: entry i is round(i * 255 / (kSrgbEntries - 1)).
+const uint8_t* plainTable();
+/// Linear light of the 256 bytes, in units of 1 / kLinearUnits.
+inline constexpr int kLinearUnits = 8 * (kSrgbEntries - 1);
+const uint16_t* linearUnitTable();
 
 /// Colours of the debug views, in linear light; t is clamped to [0, 1].
 Vec3f scalarColour(float t);          ///< dark violet, blue, green, yellow; even in lightness
@@ -68,7 +72,8 @@ Vec3f hashColour(uint64_t identity);  ///< a light colour that looks random
 /// The colour in linear light that a patch as a whole has in a view; what a view takes from the
 /// vertices or from the triangle instead multiplies it (Show::kShaded) or replaces it.
 Vec3f patchColour(const ShadeSettings& settings, const DrawPatch& patch);
-/// Row `y` of a background `height` rows high, in linear light.
-Vec3f backgroundColour(const ShadeSettings& settings, int y, int height);
+/// One row of the background, in sRGB: pixel x has colour [x % 4]. Dithered, as the steps of so
+/// gentle a gradient would be seen.
+std::array<Rgba8, 4> backgroundRow(const ShadeSettings& settings, int y, int height);
 
 }  // namespace pietra

@@ -1,62 +1,57 @@
 #include "simplify/collapse.h"
 
 #include <algorithm>
-#include <utility>
+#include <bit>
 
 namespace pietra {
 
-Placement placeEdge(const WorkingMesh& mesh, uint32_t u, uint32_t v, const SnapGrid& grid) {
-    const Point& pu = mesh.point[u];
-    const Point& pv = mesh.point[v];
-    const Vec3f edge = pv.vec() - pu.vec();
-    Quadric q = mesh.quadric[v].movedBy(-edge);
-    q.add(mesh.quadric[u]);
-    Vec3f z;
-    if (pu.rank() > pv.rank()) {
-        z = {0, 0, 0};
-    } else if (pv.rank() > pu.rank()) {
-        z = edge;
-    } else {
-        z = q.minimum();
-        const Vec3f middle = edge * 0.5f;
-        const Vec3f off = z - middle;
-        if (!(glm::dot(off, off) <= glm::dot(edge, edge))) z = middle;
-        z = grid.snap(pu.vec() + z) - pu.vec();
-    }
-    return {pu.vec() + z, std::max(q.valueAt(z), 0.0f)};
-}
-
-void Collapser::findWings(uint32_t u, uint32_t v) {
-    wing_count_ = 0;
-    const Fan& fan = mesh_.fan[u];
+/// Reads the fan of u into the ring and the triangles on the edge into the wings; marks u's link
+/// and the wings' vertices. Drops dead corners from the fan. False if the edge has none or too many
+/// triangles, or two on the same three vertices.
+bool Collapser::readFirstRing(uint32_t u, uint32_t v) {
+    Fan& fan = mesh_.fan[u];
+    uint32_t* corners = mesh_.corner.data() + fan.begin;
+    const uint32_t in_link = mesh_.epoch += 2, is_wing = in_link + 1;
+    uint32_t alive = 0, size = 0, wings = 0;
     for (uint32_t i = 0; i < fan.count; ++i) {
-        const uint32_t corner = mesh_.corner[fan.begin + i];
+        const uint32_t corner = corners[i];
         const Face& face = mesh_.face[corner >> 2];
         if (face.dead()) continue;
-        const uint32_t k = corner & 3, n = kNextCorner[k], p = kPreviousCorner[k];
-        if (face.v[n] != v && face.v[p] != v) continue;
-        if (wing_count_ == wing_.size()) {
-            wing_count_ = 0;  // four triangles: never collapsible
-            return;
+        corners[alive++] = corner;
+        const uint32_t k = corner & 3;
+        const uint32_t n = face.v[kNextCorner[k]], p = face.v[kPreviousCorner[k]];
+        if (n == v || p == v) {
+            wing_[std::min(wings++, kMaxWings)] = {
+                corner >> 2, n == v ? p : n, face.edgeClass(n == v ? kPreviousCorner[k] : k),
+                face.edgeClass(kNextCorner[k]), EdgeClass::kManifold};
+            continue;
         }
-        const bool forward = face.v[n] == v;
-        wing_[wing_count_++] = {corner >> 2, forward ? face.v[p] : face.v[n],
-                                face.edgeClass(forward ? p : k), face.edgeClass(n),
-                                EdgeClass::kManifold};
+        ring_.corner[size] = corner;
+        ring_.apex[size] = u;
+        ring_.next[size] = n;
+        ring_.previous[size] = p;
+        ++size;
+        mesh_.mark[n] = mesh_.mark[p] = in_link;
     }
+    fan.count = alive;
+    ring_.size_u = ring_.size = size;
+    if (wings == 0 || wings > kMaxWings) return false;
+    wing_count_ = wings;
+    for (uint32_t i = 0; i < wings; ++i) {
+        uint32_t& mark = mesh_.mark[wing_[i].vertex];
+        if (mark == is_wing) return false;
+        mark = is_wing;
+    }
+    return true;
 }
 
-bool Collapser::quotaAllows() const {
-    for (uint32_t i = 0; i < wing_count_; ++i)
-        if (mesh_.cellAbove(mesh_.face[wing_[i].face].cell())) return true;
-    return false;
-}
-
-/// Of the two edges that become one, one must be an ordinary edge with both its triangles in here:
-/// then the other one's uses are the new edge's.
-bool Collapser::mergeWingClasses(const Point& u, const Point& v) {
+/// Some triangle that dies must be of a cell above its quota. And of two edges that become one, one
+/// must be ordinary with both its triangles in here: then the other's uses are the new edge's.
+bool Collapser::wingsAllow(const Point& u, const Point& v) {
+    bool wanted = false;
     for (uint32_t i = 0; i < wing_count_; ++i) {
         Wing& w = wing_[i];
+        wanted |= mesh_.cellAbove(mesh_.face[w.face].cell());
         if (w.to_u == EdgeClass::kManifold && w.to_v == EdgeClass::kManifold) continue;
         const bool outer = mesh_.point[w.vertex].outer();
         if (w.to_u == EdgeClass::kManifold && !(outer && u.outer()))
@@ -66,14 +61,18 @@ bool Collapser::mergeWingClasses(const Point& u, const Point& v) {
         else
             return false;
     }
-    return true;
+    return wanted;
 }
 
-/// Also drops dead corners from the fan.
-void Collapser::readRing(uint32_t v, uint32_t other, Ring& ring) {
+/// Appends the fan of v to the ring, and checks the link condition: both ends share no neighbours
+/// but those across the edge's triangles, and no edge of their links (or two triangles would become
+/// one: a closed tetrahedron has such).
+bool Collapser::readSecondRing(uint32_t v, uint32_t u) {
     Fan& fan = mesh_.fan[v];
     uint32_t* corners = mesh_.corner.data() + fan.begin;
-    uint32_t alive = 0, size = 0;
+    const uint32_t in_link = mesh_.epoch, is_wing = in_link + 1;
+    uint32_t alive = 0, size = ring_.size;
+    bool allowed = true;
     for (uint32_t i = 0; i < fan.count; ++i) {
         const uint32_t corner = corners[i];
         const Face& face = mesh_.face[corner >> 2];
@@ -81,56 +80,43 @@ void Collapser::readRing(uint32_t v, uint32_t other, Ring& ring) {
         corners[alive++] = corner;
         const uint32_t n = face.v[kNextCorner[corner & 3]];
         const uint32_t p = face.v[kPreviousCorner[corner & 3]];
-        ring.corner[size] = corner;
-        ring.next[size] = n;
-        ring.previous[size] = p;
-        size += n != other && p != other;
+        if (n == u || p == u) continue;
+        ring_.corner[size] = corner;
+        ring_.apex[size] = v;
+        ring_.next[size] = n;
+        ring_.previous[size] = p;
+        ++size;
+        const uint32_t mark_n = mesh_.mark[n], mark_p = mesh_.mark[p];
+        allowed &= mark_n != in_link && mark_p != in_link;
+        if (mark_n == is_wing && mark_p == is_wing) [[unlikely]]
+            allowed = allowed && !facesMeet(n, p);
     }
     fan.count = alive;
-    ring.size = size;
+    ring_.size = size;
+    return allowed && size != 0;
 }
 
-/// The link condition: both ends share no neighbours but those across the edge's triangles, and no
-/// edge of their links (or two triangles would become one: a closed tetrahedron has such).
-bool Collapser::linksAllow() {
-    const uint32_t in_link = mesh_.epoch + 1, is_wing = mesh_.epoch + 2;
-    mesh_.epoch += 2;
-    for (uint32_t i = 0; i < wing_count_; ++i) {
-        uint32_t& mark = mesh_.fan[wing_[i].vertex].mark;
-        if (mark == is_wing) return false;
-        mark = is_wing;
+/// True if u has a triangle on the edge (a, b).
+bool Collapser::facesMeet(uint32_t a, uint32_t b) const {
+    for (uint32_t i = 0; i < ring_.size_u; ++i) {
+        const uint32_t n = ring_.next[i], p = ring_.previous[i];
+        if ((n == a && p == b) || (n == b && p == a)) return true;
     }
-    const auto markLink = [&](uint32_t w) {
-        uint32_t& mark = mesh_.fan[w].mark;
-        mark = mark == is_wing ? is_wing : in_link;
-        return mark == is_wing;
-    };
-    const Ring &of_u = ring_[0], &of_v = ring_[1];
-    bool wings_joined = false;
-    for (uint32_t i = 0; i < of_u.size; ++i) {
-        const bool next_is_wing = markLink(of_u.next[i]);
-        wings_joined |= markLink(of_u.previous[i]) && next_is_wing;
-    }
-    for (uint32_t i = 0; i < of_v.size; ++i) {
-        const uint32_t n = mesh_.fan[of_v.next[i]].mark, p = mesh_.fan[of_v.previous[i]].mark;
-        if (n == in_link || p == in_link) return false;
-        if (wings_joined && n == is_wing && p == is_wing) return false;
-    }
-    return true;
+    return false;
 }
 
 /// True if the removed vertex, merged into an outer one, would make a new edge to an outer vertex:
 /// the diamond across the border could make the same, and it would have four triangles.
 bool Collapser::makesOuterEdge() const {
-    const Ring& ring = ring_[0];
     const auto isNew = [&](uint32_t w) {
         for (uint32_t i = 0; i < wing_count_; ++i)
             if (wing_[i].vertex == w) return false;
         return true;
     };
-    for (uint32_t i = 0; i < ring.size; ++i) {
-        if (mesh_.point[ring.next[i]].outer() && isNew(ring.next[i])) return true;
-        if (mesh_.point[ring.previous[i]].outer() && isNew(ring.previous[i])) return true;
+    for (uint32_t i = 0; i < ring_.size_u; ++i) {
+        const uint32_t n = ring_.next[i], p = ring_.previous[i];
+        if (mesh_.point[n].outer() && isNew(n)) return true;
+        if (mesh_.point[p].outer() && isNew(p)) return true;
     }
     return false;
 }
@@ -143,105 +129,103 @@ float shapeOf(float normal_sq, float a_sq, float b_sq, float c_sq) {
     return normal_sq / (longest * longest);
 }
 
-/// Exact: twice the area is not zero.
+/// Exact: the triangle of these two sides is not degenerate.
 bool hasArea(const Vec3f& a, const Vec3f& b) {
     const int64_t ax = int64_t(a.x), ay = int64_t(a.y), az = int64_t(a.z);
     const int64_t bx = int64_t(b.x), by = int64_t(b.y), bz = int64_t(b.z);
     return ay * bz != az * by || az * bx != ax * bz || ax * by != ay * bx;
 }
 
-constexpr float kMinCosineSq = 0.2f * 0.2f;
-/// Height about 1/60 of the longest edge. Worse triangles may not get worse still.
-constexpr float kMinShape = 3e-4f;
-
 }  // namespace
 
-/// No triangle of the ring may turn by more than acos(0.2), become a sliver or lose its area when
-/// its apex goes from `from` to `to`.
-bool Collapser::keepsShape(const Ring& ring, const Vec3f& from, const Vec3f& to) const {
-    for (uint32_t i = 0; i < ring.size; ++i) {
-        const Vec3f n = mesh_.point[ring.next[i]].vec(), p = mesh_.point[ring.previous[i]].vec();
-        const Vec3f old_n = n - from, old_p = p - from, new_n = n - to, new_p = p - to;
-        const Vec3f old_normal = glm::cross(old_n, old_p), new_normal = glm::cross(new_n, new_p);
-        const float old_sq = glm::dot(old_normal, old_normal);
-        const float new_sq = glm::dot(new_normal, new_normal);
-        const float opposite = glm::dot(n - p, n - p);
-        const float new_shape =
-            shapeOf(new_sq, glm::dot(new_n, new_n), glm::dot(new_p, new_p), opposite);
-        if (!(new_shape > kMinShape)) {
-            const float old_shape =
-                shapeOf(old_sq, glm::dot(old_n, old_n), glm::dot(old_p, old_p), opposite);
-            if (!(new_shape >= old_shape) || !hasArea(new_n, new_p)) return false;
+/// None of the ring's first `count` triangles may turn by more than acos(0.2), become a sliver or
+/// lose its area when its apex goes to `to`.
+bool Collapser::keepsShapes(uint32_t count, const Vec3f& to) {
+    for (uint32_t pad = ring_.size; pad % kFoldBatch != 0; ++pad)
+        ring_.apex[pad] = ring_.next[pad] = ring_.previous[pad] = 0;  // any valid vertex
+    for (uint32_t i = 0; i < count; i += kFoldBatch) {
+        uint32_t suspects = kernels_.foldingTriangles(mesh_.point.data(), &ring_.apex[i],
+                                                      &ring_.next[i], &ring_.previous[i], to);
+        for (; suspects != 0; suspects &= suspects - 1) {
+            const uint32_t j = i + uint32_t(std::countr_zero(suspects));
+            if (j < count && !keepsShape(j, to)) return false;
         }
-        const float dot = glm::dot(old_normal, new_normal);
-        if (!(dot > 0 && dot * dot > kMinCosineSq * old_sq * new_sq) && old_sq > 0) return false;
     }
     return true;
 }
 
-uint32_t Collapser::tryCollapse(uint32_t u, uint32_t v, const SnapGrid& grid) {
-    if (mesh_.point[u].rank() > mesh_.point[v].rank()) std::swap(u, v);
-    if (mesh_.fan[u].count + mesh_.fan[v].count > kMaxRing) return kNoVertex;
-    findWings(u, v);
-    if (wing_count_ == 0 || !quotaAllows()) return kNoVertex;
-    const Point &pu = mesh_.point[u], &pv = mesh_.point[v];
-    if (!mergeWingClasses(pu, pv)) return kNoVertex;
-    readRing(u, v, ring_[0]);
-    readRing(v, u, ring_[1]);
-    if (ring_[0].size + ring_[1].size == 0) return kNoVertex;
-    if (!linksAllow()) return kNoVertex;
-    if (pv.outer() && makesOuterEdge()) return kNoVertex;
-    placement_ = placeEdge(mesh_, u, v, grid);
-    if (positions_.occupied(mesh_, placement_.position, u, v)) return kNoVertex;
-    if (!keepsShape(ring_[0], pu.vec(), placement_.position)) return kNoVertex;
-    if (pv.rank() <= pu.rank() && !keepsShape(ring_[1], pv.vec(), placement_.position))
-        return kNoVertex;
-    apply(u, v);
-    return v;
+/// As the kernel says, but slivers may become better ones, and degenerate triangles turn anyhow.
+bool Collapser::keepsShape(uint32_t i, const Vec3f& to) const {
+    const Vec3f from = mesh_.point[ring_.apex[i]].vec();
+    const Vec3f n = mesh_.point[ring_.next[i]].vec(), p = mesh_.point[ring_.previous[i]].vec();
+    const Vec3f old_n = n - from, old_p = p - from, new_n = n - to, new_p = p - to;
+    const Vec3f old_normal = glm::cross(old_n, old_p), new_normal = glm::cross(new_n, new_p);
+    const float old_sq = glm::dot(old_normal, old_normal);
+    const float new_sq = glm::dot(new_normal, new_normal);
+    const float opposite = glm::dot(n - p, n - p);
+    const float new_shape =
+        shapeOf(new_sq, glm::dot(new_n, new_n), glm::dot(new_p, new_p), opposite);
+    if (!(new_shape > kMinShape)) {
+        const float old_shape =
+            shapeOf(old_sq, glm::dot(old_n, old_n), glm::dot(old_p, old_p), opposite);
+        if (!(new_shape >= old_shape) || !hasArea(new_n, new_p)) return false;
+    }
+    if (!(old_sq > 0)) return true;
+    const float turn = glm::dot(old_normal, new_normal);
+    return turn > 0 && turn * (turn / old_sq) > kMinCosineSq * new_sq;
 }
 
-void Collapser::apply(uint32_t u, uint32_t v) {
+bool Collapser::tryCollapse(uint32_t u, uint32_t v, const Vec3f& to) {
+    if (mesh_.fan[u].count + mesh_.fan[v].count > kMaxRing) return false;
+    const Point &pu = mesh_.point[u], &pv = mesh_.point[v];
+    if (!readFirstRing(u, v) || !wingsAllow(pu, pv) || !readSecondRing(v, u)) return false;
+    if (pv.outer() && makesOuterEdge()) return false;
+    if (positions_.occupied(mesh_, to, u, v)) return false;
+    const bool v_moves = pv.rank() == pu.rank();
+    if (!keepsShapes(v_moves ? ring_.size : ring_.size_u, to)) return false;
+    apply(u, v, to);
+    return true;
+}
+
+void Collapser::apply(uint32_t u, uint32_t v, const Vec3f& to) {
     Point &pu = mesh_.point[u], &pv = mesh_.point[v];
-    const Vec3f to = placement_.position;
     Quadric q = mesh_.quadric[u].movedBy(to - pu.vec());
     q.add(mesh_.quadric[v].movedBy(to - pv.vec()));
     mesh_.quadric[v] = q;
     pv = {to.x, to.y, to.z, pv.flags | (pu.flags & kIrregularFlag)};
-    pu.flags |= kDeadFlag;
+    mesh_.killVertex(u);
     mesh_.parent[u] = v;
-    ++mesh_.fan[v].stamp;
-    removed_ = u;
-    for (uint32_t i = 0; i < wing_count_; ++i) mesh_.killFace(wing_[i].face);
-    const Ring& ring = ring_[0];
-    for (uint32_t i = 0; i < ring.size; ++i)
-        mesh_.face[ring.corner[i] >> 2].v[ring.corner[i] & 3] = v;
+    ++mesh_.stamp[v];
+    for (uint32_t i = 0; i < ring_.size_u; ++i)
+        mesh_.face[ring_.corner[i] >> 2].v[ring_.corner[i] & 3] = v;
     for (uint32_t i = 0; i < wing_count_; ++i) {
-        if (wing_[i].merged == EdgeClass::kManifold) continue;
-        for (const Ring& r : ring_)
-            for (uint32_t j = 0; j < r.size; ++j) {
-                Face& face = mesh_.face[r.corner[j] >> 2];
-                const uint32_t k = r.corner[j] & 3;
-                if (r.next[j] == wing_[i].vertex) face.setEdgeClass(k, wing_[i].merged);
-                if (r.previous[j] == wing_[i].vertex)
-                    face.setEdgeClass(kPreviousCorner[k], wing_[i].merged);
-            }
+        mesh_.killFace(wing_[i].face);
+        if (wing_[i].merged != EdgeClass::kManifold)
+            setClassOfEdgesTo(wing_[i].vertex, wing_[i].merged);
     }
     writeFan(v);
 }
 
-/// In place where both rings fit into the old fan, else at the arena's end.
+void Collapser::setClassOfEdgesTo(uint32_t w, EdgeClass c) {
+    for (uint32_t i = 0; i < ring_.size; ++i) {
+        Face& face = mesh_.face[ring_.corner[i] >> 2];
+        const uint32_t k = ring_.corner[i] & 3;
+        if (ring_.next[i] == w) face.setEdgeClass(k, c);
+        if (ring_.previous[i] == w) face.setEdgeClass(kPreviousCorner[k], c);
+    }
+}
+
+/// In place where the ring fits into the old fan, else at the arena's end.
 void Collapser::writeFan(uint32_t v) {
     Fan& fan = mesh_.fan[v];
-    const uint32_t size = ring_[0].size + ring_[1].size;
-    if (size > fan.count) {
-        if (mesh_.corner_end + size > mesh_.corner.size())
-            mesh_.corner.resize(2 * mesh_.corner.size() + size);
+    if (ring_.size > fan.count) {
+        if (mesh_.corner_end + ring_.size > mesh_.corner.size())
+            mesh_.corner.resize(2 * mesh_.corner.size() + ring_.size);
         fan.begin = mesh_.corner_end;
-        mesh_.corner_end += size;
+        mesh_.corner_end += ring_.size;
     }
-    fan.count = size;
-    uint32_t* out = mesh_.corner.data() + fan.begin;
-    for (const Ring& r : ring_) out = std::copy_n(r.corner.data(), r.size, out);
+    fan.count = ring_.size;
+    std::copy_n(ring_.corner.data(), ring_.size, mesh_.corner.data() + fan.begin);
 }
 
 }  // namespace pietra

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 
+#include "simplify/edge_kernels.h"
 #include "simplify/position_set.h"
 #include "simplify/working_mesh.h"
 
@@ -11,28 +12,6 @@ namespace pietra {
 
 /// Vertices whose fans have more corners together are left alone: keeps every collapse cheap.
 inline constexpr uint32_t kMaxRing = 256;
-
-/// Where new vertices may lie, relative to the mesh's centre.
-struct SnapGrid {
-    float step = 1, inverse_step = 1;
-    Vec3f low{0, 0, 0}, high{0, 0, 0};
-
-    Vec3f snap(const Vec3f& p) const {
-        const Vec3f r{std::floor(p.x * inverse_step + 0.5f) * step,
-                      std::floor(p.y * inverse_step + 0.5f) * step,
-                      std::floor(p.z * inverse_step + 0.5f) * step};
-        return glm::max(low, glm::min(high, r));
-    }
-};
-
-/// The best place for the vertex that edge (u, v) becomes, and the quadrics' value there.
-struct Placement {
-    Vec3f position;
-    float cost;
-};
-
-/// Ignores everything but ranks and quadrics. Not both may be fixed.
-Placement placeEdge(const WorkingMesh& mesh, uint32_t u, uint32_t v, const SnapGrid& grid);
 
 /// True if the edge that starts at corner `k` of `face` may be collapsed as far as ranks go.
 inline bool collapsibleEdge(const WorkingMesh& mesh, const Face& face, uint32_t k) {
@@ -42,10 +21,11 @@ inline bool collapsibleEdge(const WorkingMesh& mesh, const Face& face, uint32_t 
     return a + b < 2 * kRankFixed && face.edgeClass(k) != EdgeClass::kManifold;
 }
 
-/// What remains of a fan when the triangles on the collapsing edge are gone.
+/// The triangles that remain around both ends of the collapsing edge: those of u, then those of v.
 struct Ring {
-    uint32_t size = 0;
-    std::array<uint32_t, kMaxRing> corner, next, previous;
+    uint32_t size = 0;    ///< of both
+    uint32_t size_u = 0;  ///< those of u
+    std::array<uint32_t, kMaxRing + kFoldBatch> corner, apex, next, previous;
 };
 
 /// A triangle on the collapsing edge (u, v): it dies, and its edges to `vertex` become one.
@@ -56,42 +36,39 @@ struct Wing {
     EdgeClass merged;
 };
 
+inline constexpr uint32_t kMaxWings = 3;
+
 /// Tests and performs collapses; holds the walks' scratch.
 class Collapser {
 public:
-    Collapser(WorkingMesh& mesh, PositionSet& positions) : mesh_(mesh), positions_(positions) {}
+    Collapser(WorkingMesh& mesh, PositionSet& positions)
+        : mesh_(mesh), positions_(positions), kernels_(chooseEdgeKernels()) {}
 
-    /// Collapses edge (u, v), both alive, if all rules allow it. Returns the vertex that remains
-    /// (one of the two), or kNoVertex. Merges positions, quadrics, fans and classes;
-    /// `fraction`: how far along the edge, from the removed vertex to the remaining one, it now
-    /// lies.
-    uint32_t tryCollapse(uint32_t u, uint32_t v, const SnapGrid& grid);
+    /// Collapses edge (u, v), both alive, to `to`, if all rules allow it. v remains, and must not
+    /// be of lower rank. Merges positions, quadrics, fans and classes.
+    bool tryCollapse(uint32_t u, uint32_t v, const Vec3f& to);
 
-    static constexpr uint32_t kNoVertex = 0xffffffffu;
-    uint32_t removed() const { return removed_; }
-    const Placement& placement() const { return placement_; }
-    /// The fan of the vertex that remains.
-    const Ring& removedRing() const { return ring_[0]; }
-    const Ring& keptRing() const { return ring_[1]; }
+    /// After a collapse: the triangles around the vertex that remains, with its neighbours.
+    const Ring& ring() const { return ring_; }
 
 private:
-    void findWings(uint32_t u, uint32_t v);
-    bool quotaAllows() const;
-    bool mergeWingClasses(const Point& u, const Point& v);
-    void readRing(uint32_t v, uint32_t other, Ring& ring);
-    bool linksAllow();
+    bool readFirstRing(uint32_t u, uint32_t v);
+    bool readSecondRing(uint32_t v, uint32_t u);
+    bool wingsAllow(const Point& u, const Point& v);
+    bool facesMeet(uint32_t a, uint32_t b) const;
     bool makesOuterEdge() const;
-    bool keepsShape(const Ring& ring, const Vec3f& from, const Vec3f& to) const;
-    void apply(uint32_t u, uint32_t v);
+    bool keepsShapes(uint32_t count, const Vec3f& to);
+    bool keepsShape(uint32_t i, const Vec3f& to) const;
+    void apply(uint32_t u, uint32_t v, const Vec3f& to);
+    void setClassOfEdgesTo(uint32_t w, EdgeClass c);
     void writeFan(uint32_t v);
 
     WorkingMesh& mesh_;
     PositionSet& positions_;
-    std::array<Ring, 2> ring_;
-    std::array<Wing, 3> wing_;
+    EdgeKernels kernels_;
+    Ring ring_;
+    std::array<Wing, kMaxWings + 1> wing_;
     uint32_t wing_count_ = 0;
-    Placement placement_{};
-    uint32_t removed_ = kNoVertex;
 };
 
 }  // namespace pietra

@@ -4,17 +4,16 @@
 #include <cmath>
 
 #include "base/check.h"
-#include "simplify/deviation_partition.h"
+#include "simplify/deviation_direction.h"
 #include "simplify/deviation_surface.h"
 
 namespace pietra {
 
 namespace {
 
+using deviation::Direction;
 using deviation::kNone;
-using deviation::Partition;
-using deviation::Piece;
-using deviation::Polygon;
+using deviation::Progressing;
 using deviation::Surface;
 
 /// The same three positions, in any order.
@@ -36,12 +35,10 @@ bool sameTriangle(const Mesh& a, uint32_t ta, const Mesh& b, uint32_t tb) {
 
 struct Deviation::State {
     Surface before, after;
-    Partition partition;
+    Direction direction;
     std::vector<uint32_t> slot;     ///< per new face: an old face in the same slot, or kNone
     std::vector<uint8_t> kept_old;  ///< per old face: it is a face of the new mesh, unchanged
     std::vector<uint8_t> kept_new;  ///< per new face
-    std::vector<Piece> piece;
-
     void findKept(const DeviationInput& in, FaceBounds& bounds);
     uint32_t startForOld(const DeviationInput& in, uint32_t t) const;
     uint32_t startForNew(uint32_t t) const;
@@ -51,6 +48,10 @@ struct Deviation::State {
 Deviation::Deviation() : state_(std::make_unique<State>()) {}
 Deviation::~Deviation() = default;
 Deviation::Deviation(Deviation&&) noexcept = default;
+const Deviation::Counters& Deviation::counters() const {
+    return state_->direction.counters();
+}
+
 Deviation& Deviation::operator=(Deviation&&) noexcept = default;
 
 void Deviation::State::findKept(const DeviationInput& in, FaceBounds& bounds) {
@@ -72,9 +73,8 @@ void Deviation::State::findKept(const DeviationInput& in, FaceBounds& bounds) {
 }
 
 uint32_t Deviation::State::nearestTo(const Surface& source, uint32_t t, const Surface& target) {
-    const Vec3i origin = source.corner(t, 0);
-    const Vec3f centre =
-        (Vec3f(source.corner(t, 1) - origin) + Vec3f(source.corner(t, 2) - origin)) / 3.0f;
+    const Vec3f origin = source.corner(t, 0);
+    const Vec3f centre = (source.corner(t, 1) - origin + source.corner(t, 2) - origin) / 3.0f;
     return target.nearest(origin, centre, {}, {0, HUGE_VALF}).face;
 }
 
@@ -106,32 +106,17 @@ float Deviation::run(const DeviationInput& in, FaceBounds& bounds) {
     s.before.assign(*in.before);
     s.after.assign(*in.after);
     s.findKept(in, bounds);
-    const float limit = 0.5f * in.child_error;
-
-    s.partition.setTarget(s.after, {});
+    Progressing progress{in.child_error, 0};
+    s.direction.begin(s.before, s.after, old.to_original, {}, bounds.to_original, true);
     for (uint32_t t = 0; t < s.before.faceCount(); ++t) {
-        if (s.kept_old[t]) continue;
-        s.piece.clear();
-        const Vec3i origin = s.before.corner(t, 0);
-        s.partition.cover(Polygon::of(s.before.local(t, origin)), origin, t, old.to_original[t],
-                          s.startForOld(in, t), limit, s.piece);
-        for (const Piece& piece : s.piece) {
-            float& a = bounds.to_original[piece.target];
-            a = std::max(a, piece.value);
-        }
+        if (!s.kept_old[t]) s.direction.cover(t, s.startForOld(in, t), progress);
     }
-    s.partition.setTarget(s.before, old.from_original);
+    s.direction.finish(progress);
+    s.direction.begin(s.after, s.before, {}, old.from_original, bounds.from_original, false);
     for (uint32_t t = 0; t < s.after.faceCount(); ++t) {
-        if (s.kept_new[t]) continue;
-        s.piece.clear();
-        const Vec3i origin = s.after.corner(t, 0);
-        s.partition.cover(Polygon::of(s.after.local(t, origin)), origin, t, 0.0f, s.startForNew(t),
-                          limit, s.piece);
-        for (const Piece& piece : s.piece) {
-            float& b = bounds.from_original[t];
-            b = std::max(b, piece.value);
-        }
+        if (!s.kept_new[t]) s.direction.cover(t, s.startForNew(t), progress);
     }
+    s.direction.finish(progress);
     float error = 0;
     for (const float a : bounds.to_original) error = std::max(error, a);
     for (const float b : bounds.from_original) error = std::max(error, b);

@@ -63,6 +63,18 @@ public:
     /// is empty or sizes disagree.
     float run(const DeviationInput& input, FaceBounds& after_bounds);
 
+    /// How often what was done since construction, for benchmarks.
+    struct Counters {
+        uint64_t faces = 0;       ///< covered, both directions
+        uint64_t general = 0;     ///< of these, not as a height field
+        uint64_t overlaps = 0;    ///< of a face with one of the other mesh, as height fields
+        uint64_t by_height = 0;   ///< of these, accepted by the height of the other face
+        uint64_t by_overlap = 0;  ///< of these, accepted by the height over the overlap
+        uint64_t pieces = 0;      ///< left for verification
+        uint64_t verified = 0;    ///< looked at there
+    };
+    const Counters& counters() const;
+
 private:
     struct State;
     std::unique_ptr<State> state_;

@@ -40,18 +40,35 @@ bool splitPolygon(const Polygon& polygon, const Vec3f& point, const Vec3f& norma
     return true;
 }
 
+float distanceSlack(const Polygon& polygon, const LocalTriangle& triangle) {
+    Vec3f extent =
+        glm::max(glm::max(glm::abs(triangle.a), glm::abs(triangle.b)), glm::abs(triangle.c));
+    for (int i = 0; i < polygon.count; ++i) extent = glm::max(extent, glm::abs(polygon.corner[i]));
+    return kDistanceSlack * std::max({extent.x, extent.y, extent.z});
+}
+
+int farthestCorner(const Polygon& polygon, const LocalTriangle& triangle) {
+    int farthest = 0;
+    float max_sq = -1;
+    for (int i = 0; i < polygon.count; ++i) {
+        const float d = squaredDistance(polygon.corner[i], triangle);
+        if (d > max_sq) {
+            max_sq = d;
+            farthest = i;
+        }
+    }
+    return farthest;
+}
+
 float maxCornerDistance(const Polygon& polygon, const LocalTriangle& triangle) {
     float max_sq = 0;
     for (int i = 0; i < polygon.count; ++i) {
         max_sq = std::max(max_sq, squaredDistance(polygon.corner[i], triangle));
     }
-    Vec3f extent =
-        glm::max(glm::max(glm::abs(triangle.a), glm::abs(triangle.b)), glm::abs(triangle.c));
-    for (int i = 0; i < polygon.count; ++i) extent = glm::max(extent, glm::abs(polygon.corner[i]));
-    return std::sqrt(max_sq) + kDistanceSlack * std::max({extent.x, extent.y, extent.z});
+    return std::sqrt(max_sq) + distanceSlack(polygon, triangle);
 }
 
-float Partition::value(const Polygon& polygon, const Vec3i& origin, float base,
+float Partition::value(const Polygon& polygon, const Vec3f& origin, float base,
                        uint32_t target) const {
     return sumUp(base, offset_.empty() ? 0.0f : offset_[target],
                  maxCornerDistance(polygon, target_->local(target, origin)));
@@ -59,23 +76,23 @@ float Partition::value(const Polygon& polygon, const Vec3i& origin, float base,
 
 // The plane through the edge that holds the bisector of both normals: on it both faces are equally
 // far. What lies outside becomes a new item for the neighbour.
-bool Partition::cutAtEdge(Item& item, int edge, const Vec3i& origin) {
+bool Partition::cutAtEdge(Item& item, int edge, const Vec3f& origin) {
     const Surface::Face& face = target_->face(item.face);
-    const uint32_t opposite = face.opposite[edge];
-    if (opposite == kNone || uint32_t(edge) == item.from_edge) return false;
-    const Vec3f a(target_->position(face.vertex[edge]) - origin);
-    const Vec3f b(target_->position(face.vertex[(edge + 1) % 3]) - origin);
-    const Vec3f bisector = face.normal + target_->face(opposite / 3).normal;
+    const HalfEdge opposite = face.opposite[edge];
+    if (!opposite.exists() || uint32_t(edge) == item.from_edge) return false;
+    const Vec3f a = target_->position(face.vertex[edge]) - origin;
+    const Vec3f b = target_->position(face.vertex[nextCorner(edge)]) - origin;
+    const Vec3f bisector = face.normal() + target_->face(opposite.face()).normal();
     const Vec3f inward = glm::cross(bisector, b - a);
     if (glm::dot(inward, inward) <= 1e-4f * glm::dot(b - a, b - a)) return false;
     Polygon inside, outside;
     if (!splitPolygon(item.polygon, a, inward, inside, outside) || outside.count < 3) return false;
-    stack_.push_back({outside, opposite / 3, opposite % 3, item.steps + 1});
+    stack_.push_back({outside, opposite.face(), opposite.edge(), item.steps + 1});
     item.polygon = inside;
     return true;
 }
 
-void Partition::cover(const Polygon& polygon, const Vec3i& origin, uint32_t source, float base,
+void Partition::cover(const Polygon& polygon, const Vec3f& origin, uint32_t source, float base,
                       uint32_t start, float limit, std::vector<Piece>& out) {
     const size_t first = out.size();
     stack_.clear();
@@ -93,7 +110,7 @@ void Partition::cover(const Polygon& polygon, const Vec3i& origin, uint32_t sour
             if (item.polygon.count < 3) continue;
             if (cut) reached = value(item.polygon, origin, base, item.face);
         }
-        out.push_back({item.polygon, source, item.face, reached});
+        out.push_back({item.polygon, source, item.face, base, reached});
     }
 }
 

@@ -28,15 +28,23 @@ struct Polygon {
 bool splitPolygon(const Polygon& polygon, const Vec3f& point, const Vec3f& normal, Polygon& above,
                   Polygon& below);
 
+/// What rounding may add to a distance between the two.
+float distanceSlack(const Polygon& polygon, const LocalTriangle& triangle);
+
+/// The corner that is farthest from the triangle.
+int farthestCorner(const Polygon& polygon, const LocalTriangle& triangle);
+
 /// Largest distance of a corner to the triangle, slack for rounding included.
 float maxCornerDistance(const Polygon& polygon, const LocalTriangle& triangle);
 
-/// A piece and the face it went to; value = base + offset[face] + distance.
+/// A piece and the face it went to; value = base + offset[target] + distance.
 struct Piece {
     Polygon polygon;
     uint32_t source = kNone;
     uint32_t target = kNone;
+    float base = 0;
     float value = 0;
+    int cuts = 0;  ///< how often it was cut in verification
 };
 
 /// One source face at a time, see the head of this file.
@@ -50,11 +58,11 @@ public:
 
     /// Cuts `polygon` (relative to lattice point `origin`) and appends the pieces to `out`. A piece
     /// whose value is at most `limit` is not cut further.
-    void cover(const Polygon& polygon, const Vec3i& origin, uint32_t source, float base,
+    void cover(const Polygon& polygon, const Vec3f& origin, uint32_t source, float base,
                uint32_t start, float limit, std::vector<Piece>& out);
 
     /// base + offset + largest corner distance, rounded up.
-    float value(const Polygon& polygon, const Vec3i& origin, float base, uint32_t target) const;
+    float value(const Polygon& polygon, const Vec3f& origin, float base, uint32_t target) const;
 
 private:
     struct Item {
@@ -63,7 +71,7 @@ private:
         uint32_t from_edge;  ///< the face's edge it came in by, 3 if none
         int steps;
     };
-    bool cutAtEdge(Item& item, int edge, const Vec3i& origin);
+    bool cutAtEdge(Item& item, int edge, const Vec3f& origin);
 
     const Surface* target_ = nullptr;
     std::span<const float> offset_;

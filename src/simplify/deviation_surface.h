@@ -3,44 +3,69 @@
 // face. Owned by Deviation; rebuilt for every call without allocating once its arrays are large
 // enough.
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "geometry/mesh.h"
+#include "simplify/lanes4.h"
 #include "simplify/triangle_distance.h"
 
 namespace pietra::deviation {
 
 inline constexpr uint32_t kNone = ~0u;
 
+/// A face and one of its edges: edge k joins corners k and (k+1)%3.
+struct HalfEdge {
+    uint32_t bits = kNone;
+    HalfEdge() = default;
+    HalfEdge(uint32_t face, uint32_t edge) : bits(face << 2 | edge) {}
+    uint32_t face() const { return bits >> 2; }
+    uint32_t edge() const { return bits & 3; }
+    bool exists() const { return bits != kNone; }
+};
+
+inline constexpr uint32_t nextCorner(uint32_t k) {
+    return k == 2 ? 0 : k + 1;
+}
+
 class Surface {
 public:
-    struct Face {
+    struct alignas(16) Vertex {
+        std::array<float, 4> lanes;  ///< 0, x, y, z: lattice coordinates fit a float
+    };
+    struct alignas(16) Face {
+        /// 1 / (twice the area), unit normal; all zero where the face has no area
+        std::array<float, 4> area_normal;
         std::array<uint32_t, 3> vertex;
-        /// Across edge k (corners k, k+1): the neighbour's half-edge, 3 * face + edge; kNone at
-        /// borders and where other than two faces meet.
-        std::array<uint32_t, 3> opposite;
-        Vec3f normal;  ///< unit; zero where the face has no area
-        float pad;
+        /// What lies across each edge: one that exists runs the other way round, as consistent
+        /// winding has it. Missing at borders and where other than two faces meet.
+        std::array<HalfEdge, 3> opposite;
+
+        Vec3f normal() const { return {area_normal[1], area_normal[2], area_normal[3]}; }
     };
 
-    /// `mesh` must outlive the use; indices are trusted.
     void assign(const Mesh& mesh);
-    void release() { mesh_ = nullptr; }
 
     uint32_t faceCount() const { return uint32_t(face_.size()); }
-    uint32_t vertexCount() const { return uint32_t(mesh_->position.size()); }
+    uint32_t vertexCount() const { return uint32_t(vertex_.size()); }
     const Face& face(uint32_t f) const { return face_[f]; }
-    const Vec3i& position(uint32_t v) const { return mesh_->position[v]; }
-    const Vec3i& corner(uint32_t f, int k) const { return position(face_[f].vertex[k]); }
+    const Vertex& vertex(uint32_t v) const { return vertex_[v]; }
+    Vec3f position(uint32_t v) const {
+        const auto& p = vertex_[v].lanes;
+        return {p[1], p[2], p[3]};
+    }
+    Vec3f corner(uint32_t f, int k) const { return position(face_[f].vertex[k]); }
     /// Some face at a vertex, kNone if there is none.
-    uint32_t faceAt(uint32_t v) const { return face_at_[v]; }
+    uint32_t faceAt(uint32_t v) const {
+        return first_out_[v] < first_out_[v + 1] ? out_[first_out_[v]].face() : kNone;
+    }
 
-    /// The face in coordinates relative to `origin`; exact.
-    LocalTriangle local(uint32_t f, const Vec3i& origin) const {
-        return {Vec3f(corner(f, 0) - origin), Vec3f(corner(f, 1) - origin),
-                Vec3f(corner(f, 2) - origin), face_[f].normal};
+    /// The face in coordinates relative to `origin`, a lattice point: exact.
+    LocalTriangle local(uint32_t f, const Vec3f& origin) const {
+        return {corner(f, 0) - origin, corner(f, 1) - origin, corner(f, 2) - origin,
+                face_[f].normal()};
     }
 
     struct Nearest {
@@ -50,24 +75,34 @@ public:
     /// The face with the smallest distance to `origin + p`, plus `offset[face]` where `offset` is
     /// not empty (offsets are not negative); exact but for rounding. Only values below
     /// `start.value` count; without any, `start` returns.
-    Nearest nearest(const Vec3i& origin, const Vec3f& p, std::span<const float> offset,
+    Nearest nearest(const Vec3f& origin, const Vec3f& p, std::span<const float> offset,
                     Nearest start) const;
 
 private:
-    struct Block {
-        Vec3f min, max;
+    /// Boxes of four runs of faces or of four groups of such boxes; empty where there are none.
+    struct alignas(16) BoxGroup {
+        std::array<Lanes4, 3> min, max;
+        Lanes4 squaredDistance(const Vec3f& p) const;
     };
+    void listHalfEdges();
+    uint32_t onlyHalfEdge(uint32_t from, uint32_t to) const;
     void linkNeighbours();
     void computeNormals();
-    void buildBlocks() const;
+    void buildTree() const;
+    void search(size_t level, uint32_t group, const Vec3f& at, const Vec3f& origin, const Vec3f& p,
+                std::span<const float> offset, Nearest& best) const;
 
-    const Mesh* mesh_ = nullptr;
+    std::vector<Vertex> vertex_;
     std::vector<Face> face_;
-    std::vector<uint32_t> face_at_;
-    std::vector<uint32_t> first_at_vertex_;  ///< scratch: list of half-edges by their lower vertex
-    std::vector<uint32_t> next_half_edge_;
-    mutable std::vector<Block> block_;  ///< boxes of runs of faces, made when first asked for
-    mutable bool blocks_valid_ = false;
+    /// Half-edges that leave vertex v: [first_out_[v], first_out_[v + 1]) of the two lists.
+    static constexpr uint32_t kMatchWidth = 8;
+    std::vector<uint32_t> first_out_;
+    std::vector<uint32_t> out_target_;  ///< where they end; padded by kMatchWidth
+    std::vector<HalfEdge> out_;
+    /// Level 0 over runs of kRun faces, four to a group; each level over the groups of the one
+    /// before.
+    mutable std::vector<std::vector<BoxGroup>> tree_;
+    mutable bool tree_valid_ = false;
 };
 
 }  // namespace pietra::deviation

@@ -12,13 +12,13 @@ bool isPlainFan(WorkingMesh& mesh, const Fan& fan) {
     const uint32_t epoch = mesh.epoch += 2;
     for (uint32_t i = 0; i < fan.count; ++i) {
         const Face& face = mesh.face[corners[i] >> 2];
-        uint32_t& mark = mesh.fan[face.v[kNextCorner[corners[i] & 3]]].mark;
+        uint32_t& mark = mesh.mark[face.v[kNextCorner[corners[i] & 3]]];
         if (mark == epoch || face.classes() != 0) return false;
         mark = epoch;
     }
     for (uint32_t i = 0; i < fan.count; ++i) {
         const Face& face = mesh.face[corners[i] >> 2];
-        uint32_t& mark = mesh.fan[face.v[kPreviousCorner[corners[i] & 3]]].mark;
+        uint32_t& mark = mesh.mark[face.v[kPreviousCorner[corners[i] & 3]]];
         if (mark != epoch) return false;
         mark = epoch + 1;
     }

@@ -44,6 +44,8 @@ public:
         return false;
     }
 
+    void prefetch(const Vec3f& p) const { __builtin_prefetch(&slot_[startOf(p)]); }
+
 private:
     static constexpr uint32_t kEmpty = 0xffffffffu;
 

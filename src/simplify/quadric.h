@@ -18,21 +18,25 @@ struct alignas(16) Quadric {
     float a02 = 0, a12 = 0, c = 0, area = 0;
     float b0 = 0, b1 = 0, b2 = 0, unused = 0;
 
-    /// Adds a plane through the vertex: `normal` of unit length.
-    void addPlane(const Vec3f& n, float weight) {
+    /// A plane through the vertex, `normal` of unit length, and the regulariser.
+    static Quadric ofPlane(const Vec3f& n, float weight) {
         const Vec3f w = n * weight;
-        a00 += w.x * n.x;
-        a11 += w.y * n.y;
-        a22 += w.z * n.z;
-        a01 += w.x * n.y;
-        a02 += w.x * n.z;
-        a12 += w.y * n.z;
+        const float r = weight * kRegulariser;
+        Quadric q;
+        q.a00 = w.x * n.x + r;
+        q.a11 = w.y * n.y + r;
+        q.a22 = w.z * n.z + r;
+        q.a01 = w.x * n.y;
+        q.a02 = w.x * n.z;
+        q.a12 = w.y * n.z;
+        q.area = weight;
+        return q;
     }
 
-    void addRegulariser(float weight) {
-        a00 += weight * kRegulariser;
-        a11 += weight * kRegulariser;
-        a22 += weight * kRegulariser;
+    /// Adds all but b, which vanishes at first. Written so that it becomes two vector additions.
+    void addMatrix(const Quadric& q) {
+        a00 += q.a00, a11 += q.a11, a22 += q.a22, a01 += q.a01;
+        a02 += q.a02, a12 += q.a12, c += q.c, area += q.area;
     }
 
     Vec3f timesA(const Vec3f& z) const {
@@ -58,34 +62,8 @@ struct alignas(16) Quadric {
     }
 
     void add(const Quadric& q) {
-        a00 += q.a00;
-        a11 += q.a11;
-        a22 += q.a22;
-        a01 += q.a01;
-        a02 += q.a02;
-        a12 += q.a12;
-        c += q.c;
-        area += q.area;
-        b0 += q.b0;
-        b1 += q.b1;
-        b2 += q.b2;
-    }
-
-    /// Where it is least, by LDL'. Not finite where A is singular.
-    Vec3f minimum() const {
-        const float l10 = a01 / a00;
-        const float l20 = a02 / a00;
-        const float d1 = a11 - l10 * a01;
-        const float t21 = a12 - l20 * a01;
-        const float l21 = t21 / d1;
-        const float d2 = a22 - l20 * a02 - l21 * t21;
-        const float y0 = -b0;
-        const float y1 = -b1 - l10 * y0;
-        const float y2 = -b2 - l20 * y0 - l21 * y1;
-        const float z2 = y2 / d2;
-        const float z1 = y1 / d1 - l21 * z2;
-        const float z0 = y0 / a00 - l10 * z1 - l20 * z2;
-        return {z0, z1, z2};
+        addMatrix(q);
+        b0 += q.b0, b1 += q.b1, b2 += q.b2, unused += q.unused;
     }
 };
 static_assert(sizeof(Quadric) == 48);

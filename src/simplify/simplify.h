@@ -12,7 +12,7 @@
 //    two triangles have the same corners.
 //  - An edge of class kManifold, kBorder, kTriple that lies inside the diamond is used 2, 1, 3
 //  times.
-//  - At least one triangle remains.
+//  - At least one triangle remains, if there was one.
 // Without the fallback (see counters) the topology is that of the input.
 //
 // How: vertices are placed at the quadric's optimum, rounded to the lattice. Collapses are taken
@@ -44,7 +44,9 @@ struct SimplifyInput {
     /// One a triangle: its cell in the diamond, below quota.size().
     std::span<const uint8_t> cell;
     /// One a cell, at most 256: triangles to reach. A cell ends at or below its quota but where
-    /// locks hinder: it may keep as many more triangles as touch locked vertices.
+    /// locks hinder: it may keep as many more triangles as touch locked vertices. Where topology
+    /// hinders too, a quarter more may stay, and three times the quota before vertices are merged
+    /// across gaps.
     std::span<const uint32_t> quota;
     /// New vertices are snapped to multiples of 2^shift.
     int shift = 0;

@@ -58,8 +58,6 @@ inline constexpr uint32_t kPreviousCorner[4] = {2, 0, 1, 0};
 struct Fan {
     uint32_t begin;  ///< into WorkingMesh::corner
     uint32_t count;
-    uint32_t stamp;  ///< changes when the vertex moves
-    uint32_t mark;   ///< scratch of the walks: compared with WorkingMesh::epoch
 };
 
 struct WorkingMesh {
@@ -70,8 +68,10 @@ struct WorkingMesh {
     std::vector<Face> face;
     std::vector<uint32_t> corner;  ///< arena of the fans; corner.size() is its capacity
     uint32_t corner_end = 0;
-    std::vector<uint32_t> parent;  ///< the vertex it was merged into, or itself
+    std::vector<uint32_t> stamp;  ///< one a vertex: changes when it moves or dies
+    std::vector<uint32_t> mark;   ///< one a vertex: scratch of the walks, compared with `epoch`
     uint32_t epoch = 0;
+    std::vector<uint32_t> parent;  ///< the vertex it was merged into, or itself
 
     std::array<uint32_t, 256> cell_count{};
     std::array<uint32_t, 256> cell_quota{};
@@ -83,6 +83,14 @@ struct WorkingMesh {
         face[f].meta |= 1u << 31;
         const uint32_t cell = face[f].cell();
         if (cell_count[cell]-- == cell_quota[cell] + 1) --cells_above;
+    }
+
+    /// note: stamps of living vertices stay far below, so a sum with a dead one is never theirs.
+    static constexpr uint32_t kDeadStamp = 1u << 30;
+
+    void killVertex(uint32_t v) {
+        point[v].flags |= kDeadFlag;
+        stamp[v] += kDeadStamp;
     }
 
     /// The vertex that `v` is part of by now.

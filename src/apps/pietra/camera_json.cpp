@@ -96,8 +96,7 @@ Camera cameraOf(const ObjectReader& object, const Vec3d& up) {
     return camera;
 }
 
-json parseFile(const std::string& path) {
-    const std::string text = readText(path);
+json parseText(const std::string& text, const std::string& path) {
     try {
         return json::parse(text);
     } catch (const json::parse_error& fault) {
@@ -111,15 +110,23 @@ json parseFile(const std::string& path) {
 }  // namespace
 
 Camera readCamera(const std::string& path, const Vec3d& up) {
-    const json root = parseFile(path);
+    return parseCamera(readText(path), path, up);
+}
+
+CameraPath readCameraPath(const std::string& path, const Vec3d& up) {
+    return parseCameraPath(readText(path), path, up);
+}
+
+Camera parseCamera(const std::string& text, const std::string& path, const Vec3d& up) {
+    const json root = parseText(text, path);
     const ObjectReader object(path, "", root);
     const Camera camera = cameraOf(object, up);
     object.warnOfOthers({"eye", "target", "up", "fovy_deg"});
     return camera;
 }
 
-CameraPath readCameraPath(const std::string& path, const Vec3d& up) {
-    const json root = parseFile(path);
+CameraPath parseCameraPath(const std::string& text, const std::string& path, const Vec3d& up) {
+    const json root = parseText(text, path);
     const ObjectReader object(path, "", root);
     CameraPath result;
     result.seconds = object.number("seconds");

@@ -17,4 +17,8 @@ namespace pietra {
 Camera readCamera(const std::string& path, const Vec3d& up);
 CameraPath readCameraPath(const std::string& path, const Vec3d& up);
 
+/// The same from the bytes of a file; `path` is for messages.
+Camera parseCamera(const std::string& text, const std::string& path, const Vec3d& up);
+CameraPath parseCameraPath(const std::string& text, const std::string& path, const Vec3d& up);
+
 }  // namespace pietra

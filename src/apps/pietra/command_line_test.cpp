@@ -28,7 +28,9 @@ public:
                 "paint some walls",
                 {"WALL... -o PICTURE [options]"},
                 {"Paints every wall named."},
-                {{"one wall", "pietra paint north -o north.png"}}};
+                {{"one wall", "pietra paint north -o north.png"}},
+                "Paints",
+                {{"red", "a warm one"}}};
     }
     void declare(OptionSet& options) override {
         options.files("WALL", inputs, "The walls.").require();
@@ -140,7 +142,8 @@ TEST_F(CommandLine, helpAndVersionNeedNothingElse) {
               "  -o, --output PICTURE        The picture.\n", "      --coats N",
               "How many coats. (default: as needed)\n", "(default: 0.25)\n",
               "(default: 1280x1024)\n", "  # one wall\n  pietra paint north -o north.png\n",
-              "      --colour red|green      Which paint. (default: red)\n", "\nExit status:\n"})
+              "      --colour red|green      Which paint. (default: red)\n",
+              "\nPaints:\n  red         a warm one\n", "\nExit status:\n"})
             EXPECT_NE(page.find(part), std::string::npos) << part << "\nin\n" << page;
         std::istringstream lines(page);
         for (std::string l; std::getline(lines, l);) EXPECT_LE(l.size(), 100u) << l;

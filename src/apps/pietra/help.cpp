@@ -12,6 +12,7 @@ namespace pietra {
 namespace {
 
 constexpr size_t kOptionColumn = 30;
+constexpr size_t kTermColumn = 14;
 
 /// Appends `text` in lines of at most `columns`, all but the first indented; `used`: columns
 /// already filled on the first line.
@@ -138,6 +139,9 @@ std::string verbHelp(const VerbText& text, const OptionSet& options, const Optio
         out += '\n';
         appendParagraph(out, paragraph, 0, size_t(columns));
     }
+    if (!text.terms.empty()) out += fmt::format("\n{}:\n", text.terms_title);
+    for (const auto& [term, meaning] : text.terms)
+        appendEntry(out, term, meaning, kTermColumn, size_t(columns));
     out += "\nArguments and options:\n";
     appendOptions(out, options, columns);
     appendCommon(out, common, columns);

@@ -60,6 +60,15 @@ Option& OptionSet::texts(const char* names, const char* value, std::vector<std::
                  .set = [&target](const auto& values) { target = values; }});
 }
 
+Option& OptionSet::custom(const char* names, const char* value, const char* standard,
+                          const char* help, std::function<void(const std::string&)> set) {
+    return push({.names = names,
+                 .value = value,
+                 .help = help,
+                 .standard = standard,
+                 .set = [set](const auto& values) { set(values.back()); }});
+}
+
 Option& OptionSet::choice(const char* names, std::string& target,
                           const std::vector<std::string>& words, const char* help) {
     Option& option = text(names, "", target, help);

@@ -50,6 +50,9 @@ public:
     Option& text(const char* names, const char* value, std::string& target, const char* help);
     Option& texts(const char* names, const char* value, std::vector<std::string>& target,
                   const char* help);
+    /// Anything else: `set` gets the value, and throws UsageError where it is wrong.
+    Option& custom(const char* names, const char* value, const char* standard, const char* help,
+                   std::function<void(const std::string&)> set);
     /// One of a few words.
     Option& choice(const char* names, std::string& target, const std::vector<std::string>& words,
                    const char* help);

@@ -28,6 +28,9 @@ struct VerbText {
     std::vector<std::string> usage;        ///< "IN... -o OUT.pietra [options]", without the name
     std::vector<std::string> description;  ///< paragraphs
     std::vector<std::pair<std::string, std::string>> examples;  ///< what for, command line
+    /// A table of words and what they mean, with its title; may be empty.
+    std::string terms_title = {};
+    std::vector<std::pair<std::string, std::string>> terms = {};
 };
 
 /// What a running verb is given.
@@ -42,7 +45,7 @@ public:
     virtual VerbText text() const = 0;
     /// Called once, before parsing; targets are members of the verb.
     virtual void declare(OptionSet& options) = 0;
-    /// Returns the exit code: 0, or 6 where a check found a fault. Everything else is thrown.
+    /// Returns the exit code: 0, or what a check found (3: damaged, 6: faulty); all else is thrown.
     virtual int run(const RunContext& context) = 0;
 };
 

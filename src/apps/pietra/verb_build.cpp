@@ -1,163 +1,252 @@
-// `pietra build`: from mesh files to a model.
+// pietra build: meshes in, a model out.
 
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
 #include <nlohmann/json.hpp>
 
-#include <chrono>
-#include <thread>
-
 #include "apps/pietra/json_report.h"
+#include "apps/pietra/limits.h"
 #include "apps/pietra/logging.h"
 #include "apps/pietra/verbs.h"
 #include "base/budget.h"
 #include "base/error.h"
 #include "base/text.h"
+#include "io/triangle_source.h"
 #include "methods/method_table.h"
 
 namespace pietra {
+
 namespace {
 
-PrecisionSetting parsePrecision(const std::string& text) {
-    if (text == "auto") return {PrecisionSetting::Kind::kAuto, 0};
-    if (text == "finest") return {PrecisionSetting::Kind::kFinest, 0};
-    try {
-        return {PrecisionSetting::Kind::kStep, parseNumber(text, {.min = 0, .above = true})};
-    } catch (const UsageError&) {
-        throw UsageError(fmt::format(
-            "--precision {}: is \"auto\", \"finest\" or a positive number, as in 0.001", text));
-    }
+using Json = nlohmann::ordered_json;
+
+constexpr size_t kLeastMemory = size_t(128) << 20;
+
+bool sameFile(const std::string& a, const std::string& b) {
+    struct stat first {
+    }, second{};
+    return ::stat(a.c_str(), &first) == 0 && ::stat(b.c_str(), &second) == 0 &&
+           first.st_dev == second.st_dev && first.st_ino == second.st_ino;
 }
 
-std::string directoryOf(const std::string& path) {
+std::string folderOf(const std::string& path) {
     const size_t slash = path.rfind('/');
     return slash == std::string::npos ? "." : path.substr(0, slash + 1);
 }
 
+void checkFolder(const std::string& path) {
+    struct stat info {};
+    if (::stat(path.c_str(), &info) != 0) throw IoError(path, "use as --temp-dir", errno);
+    if (!S_ISDIR(info.st_mode)) throw IoError(path, "use as --temp-dir", ENOTDIR);
+    if (::access(path.c_str(), W_OK | X_OK) != 0) throw IoError(path, "use as --temp-dir", errno);
+}
+
+PrecisionSetting parsePrecision(const std::string& word) {
+    if (word == "auto") return {PrecisionSetting::Kind::kAuto, 0};
+    if (word == "finest") return {PrecisionSetting::Kind::kFinest, 0};
+    try {
+        return {PrecisionSetting::Kind::kStep, parseNumber(word, {.min = 0, .above = true})};
+    } catch (const UsageError&) {
+        throw UsageError(fmt::format("'{}' is neither auto nor finest nor a number above 0", word));
+    }
+}
+
 class BuildVerb : public Verb {
 public:
-    VerbText text() const override {
-        return {
-            "build",
-            "make a multiresolution model from mesh files",
-            {"IN... -o OUT.pietra [options]"},
-            {"Reads one or several mesh files as one model and writes a .pietra file, from which the "
-             "mesh can be looked at, extracted and checked at any resolution. Every resolution "
-             "carries a proven bound of its distance to the input.",
-             "Works in the memory given, however large the mesh is; what does not fit waits in "
-             "temporary files. The file written does not depend on --jobs, --memory or the machine."},
-            {{"Build with all defaults", "pietra build statue.ply -o statue.pietra"},
-             {"A billion triangles in 512 MiB", "pietra build big.ply -o big.pietra --memory 512M "
-                                                "--temp-dir /scratch"}},
-        };
-    }
-
-    void declare(OptionSet& options) override {
-        options.files("IN", inputs_, "mesh files; several are one model").require();
-        options.text("-o,--output", "OUT.pietra", output_, "the model to write").require();
-        std::vector<std::string> names;
-        for (const Method& m : methods()) names.emplace_back(m.name);
-        options.choice("--method", method_, names, "how the model is organised");
-        options.size("--memory", memory_, "bound of the process's resident memory")
-            .defaultsTo("half of the machine's");
-        options.count("--jobs", "N", jobs_, {.min = 1, .max = 1024}, "threads")
-            .defaultsTo("all processors");
-        options.text("--temp-dir", "DIR", temp_dir_, "where temporary files go")
-            .defaultsTo("the folder of the output");
-        options.flag("--resume", resume_, "go on with an interrupted build");
-        options.text("--precision", "P", precision_,
-                     "how fine positions are kept: auto (error below 1/50 of the median edge), "
-                     "finest (21 bits an axis), or a step in the input's units");
-        options.count("--leaf-triangles", "N", leaf_triangles_, {.min = 64, .max = 1 << 20},
-                      "most triangles of a patch at full resolution");
-        options.count("--patch-triangles", "N", patch_triangles_, {.min = 64, .max = 1 << 20},
-                      "about how many triangles coarser patches have");
-        options.flag("--dry-run", dry_run_, "only read the inputs' headers and say what they hold");
-    }
-
-    int run(const RunContext& context) override {
-        if (resume_)
-            throw UsageError("--resume: resuming is not available yet: start again without it");
-        BuildSettings settings;
-        settings.precision = parsePrecision(precision_);
-        const Method* method = findMethod(method_);
-        const std::unique_ptr<TriangleSource> source = openSource(inputs_);
-        if (dry_run_) return dryRun(*source);
-        checkOutput(output_, context.common.force);
-        settings.output = output_;
-        settings.force = context.common.force;
-        settings.memory_bytes = memory_ ? size_t(*memory_) : machineMemoryBytes() / 2;
-        settings.jobs = int(jobs_ ? *jobs_ : std::max(1u, std::thread::hardware_concurrency()));
-        settings.temp_dir = temp_dir_.empty() ? directoryOf(output_) : temp_dir_;
-        settings.leaf_triangles = leaf_triangles_;
-        settings.patch_triangles = patch_triangles_;
-        settings.input_name = inputs_[0];
-        settings.input_files = uint32_t(inputs_.size());
-        const auto began = std::chrono::steady_clock::now();
-        const BuildReport report = method->build(*source, settings, context.progress);
-        const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - began;
-        for (const std::string& note : report.notes) logInfo(note);
-        logInfo(fmt::format(
-            "{}: {} triangles in {} ({} triangles/s), {} on disk ({:.2f} bytes a triangle), peak "
-            "memory {}",
-            output_, formatCount(double(report.input_triangles)), formatSeconds(seconds.count()),
-            formatCount(double(report.input_triangles) / seconds.count()),
-            formatBytes(report.output_bytes),
-            double(report.output_bytes) / double(std::max<uint64_t>(report.input_triangles, 1)),
-            formatBytes(peakResidentBytes())));
-        writeReport(context.common.report,
-                    reportJson(settings, report, *source, seconds.count(), context.progress),
-                    context.common.force);
-        return 0;
-    }
+    VerbText text() const override;
+    void declare(OptionSet& options) override;
+    int run(const RunContext& context) override;
 
 private:
-    int dryRun(TriangleSource& source) const {
-        printOut(fmt::format("{}: {} vertices, {} triangles, {}\n", inputs_[0],
-                             source.vertexCount(), source.triangleCountHint(),
-                             formatBytes(source.inputBytes())));
-        return 0;
-    }
-
-    nlohmann::ordered_json reportJson(const BuildSettings& settings, const BuildReport& report,
-                                      const TriangleSource& source, double seconds,
-                                      const Progress& progress) const {
-        nlohmann::ordered_json json;
-        json["method"] = method_;
-        json["input"] = {{"triangles", report.input_triangles},
-                         {"vertices", report.input_vertices},
-                         {"bytes", source.inputBytes()},
-                         {"border_edges", report.border_edges},
-                         {"non_manifold_edges", report.non_manifold_edges},
-                         {"inconsistent_edges", report.inconsistent_edges}};
-        json["seconds"]["total"] = seconds;
-        for (const auto& [stage, stage_seconds] : progress.stageSeconds())
-            json["seconds"][stage] = stage_seconds;
-        json["triangles_per_second"] = double(report.input_triangles) / seconds;
-        json["peak_rss_bytes"] = peakResidentBytes();
-        json["memory_limit_bytes"] = settings.memory_bytes;
-        json["temp_bytes_peak"] = report.temp_bytes_peak;
-        json["output_bytes"] = report.output_bytes;
-        json["levels"] = report.levels;
-        json["nodes"] = report.nodes;
-        json["jobs"] = settings.jobs;
-        json["ranks"] = 1;
-        json["dropped"] = {{"degenerate", report.dropped_degenerate},
-                           {"duplicate", report.dropped_duplicate}};
-        json["resumed"] = false;
-        json["notes"] = report.notes;
-        return json;
-    }
+    BuildSettings settings(const RunContext& context) const;
+    std::string inputName() const;
+    int dryRun(TriangleSource& source, const BuildSettings& settings) const;
+    Json report(const BuildReport& result, const BuildSettings& settings, uint64_t input_bytes,
+                double seconds, const Progress& progress) const;
+    void summarise(const BuildReport& result, double seconds) const;
 
     std::vector<std::string> inputs_;
-    std::string output_, temp_dir_, method_ = methods()[0].name, precision_ = "auto";
-    std::optional<uint64_t> memory_, jobs_;
-    uint32_t leaf_triangles_ = 4000, patch_triangles_ = 2000;
-    bool resume_ = false, dry_run_ = false;
+    std::string output_;
+    std::string method_ = methods().front().name;
+    Limits limits_;
+    std::string temp_dir_;
+    PrecisionSetting precision_;
+    uint64_t leaf_triangles_ = BuildSettings().leaf_triangles;
+    uint64_t patch_triangles_ = BuildSettings().patch_triangles;
+    bool resume_ = false;
+    bool dry_run_ = false;
 };
+
+VerbText BuildVerb::text() const {
+    return {
+        "build",
+        "make a model from one or more meshes",
+        {"IN... -o OUT.pietra [options]"},
+        {"Reads triangle meshes, several as one, and writes the multiresolution model that all "
+         "other verbs take. The memory it needs does not grow with the mesh; what does not fit "
+         "goes "
+         "to temporary files, some 60 to 100 bytes a triangle. The output appears under its name "
+         "only when it is complete.",
+         "Formats are told by content: PLY (also gzipped), OBJ, STL, glTF and GLB as far as this "
+         "program's version reads them. Normals, colours and scalar attributes are kept.",
+         "The bytes of the model depend on the bytes of the input, the method, the precision and "
+         "the patch sizes alone: not on memory, threads or names."},
+        {{"a model of a scan", "pietra build statue.ply -o statue.pietra"},
+         {"from several files, in a gigabyte of memory",
+          "pietra build part1.ply part2.ply -o all.pietra --memory 1G"},
+         {"what would be read, without building",
+          "pietra build statue.ply -o x.pietra --dry-run"}}};
+}
+
+void BuildVerb::declare(OptionSet& options) {
+    options.files("IN", inputs_, "Mesh files.").require();
+    options.text("-o,--output", "OUT.pietra", output_, "The model to write.").require();
+    std::vector<std::string> names;
+    for (const Method& method : methods()) names.push_back(method.name);
+    options.choice("--method", method_, names, "How the model is made.");
+    limits_.declare(options);
+    options
+        .text("--temp-dir", "DIR", temp_dir_,
+              "Where temporary files go; they have no names and vanish with the process.")
+        .defaultsTo("the output's folder");
+    options.flag("--resume", resume_, "Go on with an interrupted build; not available yet.");
+    options.custom("--precision", "auto|finest|STEP", "auto",
+                   "Spacing of the lattice onto which vertices move: the coarsest that keeps the "
+                   "error below 1/50 of the median edge (auto), the finest, of 21 bits an axis, or "
+                   "a step in the input's units.",
+                   [this](const std::string& word) { precision_ = parsePrecision(word); });
+    options.count("--leaf-triangles", "N", leaf_triangles_, {.min = 100, .max = 50'000},
+                  "Most triangles of a patch of the input's own resolution.");
+    options.count("--patch-triangles", "N", patch_triangles_, {.min = 100, .max = 50'000},
+                  "Triangles of a coarser patch, about.");
+    options.flag("--dry-run", dry_run_,
+                 "Only read the input once, and print what would be built; nothing is written.");
+}
+
+std::string BuildVerb::inputName() const {
+    return inputs_.size() == 1 ? inputs_[0]
+                               : fmt::format("{} and {} more", inputs_[0], inputs_.size() - 1);
+}
+
+BuildSettings BuildVerb::settings(const RunContext& context) const {
+    if (resume_) throw UsageError("resuming is not available yet: start again without --resume");
+    BuildSettings settings;
+    settings.output = output_;
+    settings.force = context.common.force;
+    settings.memory_bytes = limits_.memoryBytes(kLeastMemory, "building");
+    settings.jobs = limits_.threads();
+    settings.temp_dir = temp_dir_.empty() ? folderOf(output_) : temp_dir_;
+    settings.precision = precision_;
+    settings.leaf_triangles = uint32_t(leaf_triangles_);
+    settings.patch_triangles = uint32_t(patch_triangles_);
+    settings.input_name = inputName();
+    settings.input_files = uint32_t(inputs_.size());
+    for (const std::string& input : inputs_)
+        if (sameFile(input, output_))
+            throw UsageError(fmt::format("{}: is an input and the output", output_));
+    if (!dry_run_) {
+        checkOutput(output_, context.common.force);
+        checkFolder(settings.temp_dir);
+    }
+    return settings;
+}
+
+int BuildVerb::dryRun(TriangleSource& source, const BuildSettings& settings) const {
+    uint64_t triangles = 0;
+    TriangleBatch batch;
+    source.rewindTriangles();
+    while (source.readTriangles(batch)) triangles += batch.triangle.size();
+    const AttributeSchema& schema = source.schema();
+    std::string attributes = schema.normals_given ? "normals" : "normals (to be computed)";
+    if (schema.colours) attributes += ", colours";
+    for (const std::string& name : schema.scalars) attributes += ", " + name;
+    printOut(
+        fmt::format("input        {}, {}\n"
+                    "triangles    {}\n"
+                    "vertices     {}\n"
+                    "attributes   {}\n"
+                    "method       {}\n"
+                    "memory       {}\n"
+                    "threads      {}\n"
+                    "output       {}\n"
+                    "temporary    {}\n",
+                    settings.input_name, formatBytes(source.inputBytes()), triangles,
+                    source.vertexCount(), attributes, method_, formatBytes(settings.memory_bytes),
+                    settings.jobs, output_, settings.temp_dir));
+    for (const std::string& note : source.notes()) logWarning(note);
+    return 0;
+}
+
+Json BuildVerb::report(const BuildReport& result, const BuildSettings& settings,
+                       uint64_t input_bytes, double seconds, const Progress& progress) const {
+    Json times{{"total", seconds}};
+    for (auto [name, stage_seconds] : progress.stageSeconds()) {
+        std::replace(name.begin(), name.end(), ' ', '_');
+        times[name] = times.value(name, 0.0) + stage_seconds;
+    }
+    return {{"method", method_},
+            {"input",
+             {{"triangles", result.input_triangles},
+              {"vertices", result.input_vertices},
+              {"bytes", input_bytes},
+              {"files", inputs_.size()},
+              {"border_edges", result.border_edges},
+              {"non_manifold_edges", result.non_manifold_edges},
+              {"inconsistent_edges", result.inconsistent_edges}}},
+            {"seconds", times},
+            {"triangles_per_second", double(result.input_triangles) / seconds},
+            {"peak_rss_bytes", peakResidentBytes()},
+            {"memory_limit_bytes", settings.memory_bytes},
+            {"temp_bytes_peak", result.temp_bytes_peak},
+            {"output_bytes", result.output_bytes},
+            {"jobs", settings.jobs},
+            {"ranks", 1},
+            {"dropped",
+             {{"degenerate", result.dropped_degenerate}, {"duplicate", result.dropped_duplicate}}},
+            {"resumed", false},
+            {"nodes", result.nodes},
+            {"levels", result.levels},
+            {"notes", result.notes}};
+}
+
+void BuildVerb::summarise(const BuildReport& result, double seconds) const {
+    for (const std::string& note : result.notes) logWarning(note);
+    if (result.dropped_degenerate + result.dropped_duplicate > 0)
+        logInfo(fmt::format("{} degenerate and {} duplicate triangles were left out",
+                            result.dropped_degenerate, result.dropped_duplicate));
+    logInfo(fmt::format(
+        "{}: {} triangles in {} ({}/s), {}, {:.2f} bytes a triangle, peak memory {}", output_,
+        formatCount(double(result.input_triangles)), formatSeconds(seconds),
+        formatCount(double(result.input_triangles) / seconds), formatBytes(result.output_bytes),
+        double(result.output_bytes) / double(std::max<uint64_t>(result.input_triangles, 1)),
+        formatBytes(peakResidentBytes())));
+}
+
+int BuildVerb::run(const RunContext& context) {
+    const auto start = std::chrono::steady_clock::now();
+    const BuildSettings build_settings = settings(context);
+    const auto source = openSource(inputs_);
+    if (dry_run_) return dryRun(*source, build_settings);
+    const BuildReport result =
+        findMethod(method_)->build(*source, build_settings, context.progress);
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    summarise(result, seconds);
+    writeReport(context.common.report,
+                report(result, build_settings, source->inputBytes(), seconds, context.progress),
+                context.common.force);
+    return 0;
+}
 
 }  // namespace
 
-std::unique_ptr<Verb> makeBuildVerb() { return std::make_unique<BuildVerb>(); }
+std::unique_ptr<Verb> makeBuildVerb() {
+    return std::make_unique<BuildVerb>();
+}
 
 }  // namespace pietra

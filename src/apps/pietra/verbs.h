@@ -8,9 +8,15 @@
 
 namespace pietra {
 
-using VerbTable = std::vector<std::unique_ptr<Verb>>;
-
 std::unique_ptr<Verb> makeBuildVerb();
+std::unique_ptr<Verb> makeInfoVerb();
+std::unique_ptr<Verb> makeCheckVerb();
+std::unique_ptr<Verb> makeExtractVerb();
+std::unique_ptr<Verb> makeRenderVerb();
+std::unique_ptr<Verb> makeCompareVerb();
+std::unique_ptr<Verb> makeSynthVerb();
+
+using VerbTable = std::vector<std::unique_ptr<Verb>>;
 
 /// All verbs, in the order in which the help page lists them.
 VerbTable makeVerbs();

@@ -17,9 +17,9 @@ namespace pietra::tetra {
 
 namespace {
 
-/// How the memory limit is spent. What the libraries and the program itself take is set aside first;
-/// of the rest, `work` is for the stages' own arrays, and temporary data may stay in memory as long
-/// as that much remains free.
+/// How the memory limit is spent. What the libraries and the program itself take is set aside
+/// first; of the rest, `work` is for the stages' own arrays, and temporary data may stay in memory
+/// as long as that much remains free.
 struct MemoryPlan {
     size_t budget, work;
     PartitionSettings partition;
@@ -76,7 +76,7 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
 
     LevelSettings level_settings{settings.patch_triangles, vertices.lattice().shift,
                                  source.schema(), vertices.quantisationError(), settings.jobs};
-    const uint32_t levels = buildLevels(leaves, level_settings, space, writer, progress);
+    const LevelCounts counts = buildLevels(leaves, level_settings, space, writer, progress);
 
     BuildReport report;
     report.input_triangles = leaves.triangles + leaves.duplicates + partition.degenerateCount();
@@ -86,7 +86,8 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
     report.border_edges = leaves.edges.border;
     report.non_manifold_edges = leaves.edges.non_manifold;
     report.inconsistent_edges = leaves.edges.inconsistent;
-    report.levels = levels;
+    report.levels = counts.levels;
+    report.stored_triangles = counts.triangles;
     report.nodes = writer.nodeCount();
     report.notes = source.notes();
 

@@ -1,7 +1,7 @@
 #pragma once
-// Construction by Adaptive TetraPuzzles (Cignoni et al. 2004, section 5), out of core: vertices onto
-// the lattice, triangles into leaf cells, then level by level, fine to coarse, every diamond merged,
-// simplified, bounded, saturated and written. See README.md in this folder.
+// Construction by Adaptive TetraPuzzles (Cignoni et al. 2004, section 5), out of core: vertices
+// onto the lattice, triangles into leaf cells, then level by level, fine to coarse, every diamond
+// merged, simplified, bounded, saturated and written. See README.md in this folder.
 
 #include "multires/method.h"
 

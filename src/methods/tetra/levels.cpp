@@ -65,21 +65,19 @@ public:
           space_(space),
           writer_(writer),
           progress_(progress),
-          workers_([this] {
-              return Worker(settings_.shift, int(settings_.schema.scalars.size()));
-          }) {
+          workers_(
+              [this] { return Worker(settings_.shift, int(settings_.schema.scalars.size())); }) {
         page_settings_.shift = settings.shift;
         page_settings_.colours = settings.schema.colours;
         page_settings_.scalar_count = int(settings.schema.scalars.size());
     }
 
-    uint32_t run() {
-        // Levels store about 2.5 times the input together: only progress depends on this guess.
-        progress_.beginStage("coarsen", leaves_.triangles * 5 / 2);
-        uint32_t levels = 0;
+    LevelCounts run() {
+        // Levels store about 3 times the input together: only progress depends on this guess.
+        progress_.beginStage("coarsen", leaves_.triangles * 3);
         for (int level = leaves_.tree->deepestLevel(); level >= 0; --level)
-            if (buildLevel(level)) levels = std::max(levels, uint32_t(level) + 1);
-        return levels;
+            if (buildLevel(level)) counts_.levels = std::max(counts_.levels, uint32_t(level) + 1);
+        return counts_;
     }
 
 private:
@@ -105,6 +103,7 @@ private:
     std::unique_ptr<CellStore> store_below_, store_;
     NodeIndex nodes_in_level_ = 0;
     uint32_t groups_ = 0;
+    LevelCounts counts_;
 };
 
 std::vector<Item> LevelBuilder::itemsOf(int level) const {
@@ -212,8 +211,8 @@ void LevelBuilder::runLeaf(const Item& item, const CellMesh& mesh, UnitResult& r
     node.saturated = node.bounds;
     node.error = settings_.quantisation_error;
     result.nodes.push_back(node);
-    result.states.push_back({item.cells[0],
-                             {leaves_.blobs.at(item.cells[0]), kNoNode, node.error, node.saturated}});
+    result.states.push_back(
+        {item.cells[0], {leaves_.blobs.at(item.cells[0]), kNoNode, node.error, node.saturated}});
     result.input_triangles += node.triangles;
 }
 
@@ -243,7 +242,8 @@ void LevelBuilder::runDiamond(const Item& item, int level, DiamondOutput& output
     for (size_t c = 0; c < item.cells.size(); ++c) {
         Node node = describe(output.cells[c].mesh, worker);
         for (int bit : {0, 1})
-            if (const auto child = below_.find(cellChild(item.cells[c], bit)); child != below_.end())
+            if (const auto child = below_.find(cellChild(item.cells[c], bit));
+                child != below_.end())
                 node.child[bit] = child->second.position;
         spheres.push_back(node.bounds);
         result.nodes.push_back(node);
@@ -265,8 +265,9 @@ void LevelBuilder::runDiamond(const Item& item, int level, DiamondOutput& output
 void LevelBuilder::write(UnitResult& result) {
     for (size_t i = 0; i < result.nodes.size(); ++i) {
         Node& node = result.nodes[i];
-        const bool joins = !node.isLeaf() && i > 0 && !result.nodes[i - 1].isLeaf() &&
-                           node.group != uint32_t(i);
+        const bool joins =
+            !node.isLeaf() && i > 0 && !result.nodes[i - 1].isLeaf() && node.group != uint32_t(i);
+        counts_.triangles += node.triangles;
         node.group = joins ? groups_ - 1 : groups_++;
         result.states[i].second.position = nodes_in_level_++;
     }
@@ -276,7 +277,7 @@ void LevelBuilder::write(UnitResult& result) {
 
 }  // namespace
 
-uint32_t buildLevels(Leaves& leaves, const LevelSettings& settings, TempSpace& space,
+LevelCounts buildLevels(Leaves& leaves, const LevelSettings& settings, TempSpace& space,
                      ModelWriter& writer, Progress& progress) {
     return LevelBuilder(leaves, settings, space, writer, progress).run();
 }

@@ -1,7 +1,8 @@
 #pragma once
 // What one call of draw() works on: patches with their screen vertices side by side, and a number
-// for every triangle, from which patch and triangle are found again.
+// for every triangle of the call.
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -10,28 +11,37 @@
 
 namespace pietra {
 
-/// Each patch's triangle numbers begin at a multiple of this, so that a table of one entry a block
-/// finds the patch.
-inline constexpr int kNumberBlockBits = 8;
+/// Asks for memory all at once, where it will be read piece by piece in no order that the hardware
+/// could foresee.
+inline void prefetchBytes(const void* begin, size_t bytes) {
+    constexpr size_t kCacheLine = 64;
+    for (size_t i = 0; i < bytes; i += kCacheLine)
+        __builtin_prefetch(static_cast<const char*>(begin) + i);
+}
 
 struct BatchPatch {
     const DrawPatch* patch = nullptr;
+    ScreenVertex* vertex = nullptr;  ///< in Batch::vertex, as the mesh's positions
+    uint32_t first_number = 0;       ///< of its triangles
     bool both_sides = true;
-    uint32_t first_vertex = 0;  ///< in Batch::vertex
-    uint32_t first_number = 0;  ///< of its triangles
-    PixelBox box;               ///< holds all its samples
-    bool whole = true;          ///< every vertex has an image
-    Vec3f colour{1, 1, 1};      ///< patchColour()
+    bool whole = true;      ///< every vertex has an image
+    PixelBox box;           ///< holds all its pixels
+    Vec3f colour{1, 1, 1};  ///< patchColour()
+    const Mesh& mesh() const { return *patch->mesh; }
+    const Triangle* triangle() const { return patch->mesh->triangle.data(); }
+};
+
+/// Consecutive triangles of one patch, drawn and shaded as a whole by each tile it touches.
+struct DrawChunk {
+    const BatchPatch* patch;
+    uint32_t first, count;  ///< triangles of the patch
+    PixelBox box;           ///< holds all its pixels
+    uint32_t firstNumber() const { return patch->first_number + first; }
 };
 
 struct Batch {
     std::vector<BatchPatch> patch;
     std::vector<ScreenVertex> vertex;
-    std::vector<uint32_t> patch_of_block;  ///< by triangle number >> kNumberBlockBits
-
-    const BatchPatch& patchOf(uint32_t number) const {
-        return patch[patch_of_block[number >> kNumberBlockBits]];
-    }
 };
 
 }  // namespace pietra

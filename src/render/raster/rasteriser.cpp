@@ -1,20 +1,32 @@
 #include "render/raster/rasteriser.h"
 
+#include <atomic>
 #include <chrono>
 #include <limits>
-#include <optional>
 
 #include "base/check.h"
 #include "base/parallel.h"
 #include "render/raster/batch.h"
 #include "render/raster/clip.h"
 #include "render/raster/coverage.h"
+#include "render/raster/finish_picture.h"
 #include "render/raster/pixel_shader.h"
+#include "render/raster/resolve.h"
+#include "render/raster/tiling.h"
+#include "render/raster/transform.h"
+#include "render/raster/triangle_kernel.h"
 
 namespace pietra {
 namespace {
 
-constexpr int kTileRows = 64;
+/// A larger mesh is drawn in several chunks.
+constexpr size_t kChunkTriangles = 4096;
+/// More tiles than threads, so that none waits long for the last one.
+constexpr size_t kTilesPerThread = 8;
+
+size_t threadCount() {
+    return tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+}
 
 class Stopwatch {
 public:
@@ -37,6 +49,7 @@ struct Rasteriser::State {
     ShadeSettings settings;
     int samples;
     std::vector<VisibilityKey> key;
+    bool finished = false;             // the keys are then all zero again
     std::vector<Rgba8> sample_colour;  // with 4 samples; with 1 it is the picture's
     Picture picture;
     Batch batch;
@@ -49,147 +62,141 @@ struct Rasteriser::State {
     void begin();
     PixelBox screen() const { return {0, 0, picture.size.width, picture.size.height}; }
     void layOut(std::span<const DrawPatch> patches);
-    void transform(BatchPatch& patch);
-    void drawPatch(const BatchPatch& patch, const VisibilityTile& tile);
-    void resolve(const PixelShader& shader, const PixelBox& box);
-    void finishRow(int y);
-    Rgba8 averagedColour(size_t pixel, const Vec3f& background) const;
+    void transform(BatchPatch& patch) const;
+    std::vector<DrawChunk> makeChunks() const;
+    PixelBox boxOf(const DrawChunk& chunk) const;
+    void drawChunk(const DrawChunk& chunk, const VisibilityTile& tile) const;
+    void drawTiles(const std::vector<DrawChunk>& chunks);
 };
 
 void Rasteriser::State::begin() {
     picture.size = view.size();
+    CHECK_LE(std::max(picture.size.width, picture.size.height), kMaxPictureSide);
     picture.focal_px = view.focal_px();
     const size_t pixels = picture.pixelCount();
     picture.colour.resize(pixels);
     picture.depth.resize(pixels);
-    key.assign(pixels * size_t(samples), 0);
+    const size_t keys = pixels * size_t(samples);
+    if (key.size() != keys || !finished) key.assign(keys, 0);
+    finished = false;
     if (samples > 1) sample_colour.resize(pixels * size_t(samples));
     statistics = {};
 }
 
 void Rasteriser::State::layOut(std::span<const DrawPatch> patches) {
     batch.patch.clear();
-    batch.patch_of_block.clear();
-    size_t vertices = 0;
+    size_t vertices = 0, number = 0;
+    for (const DrawPatch& patch : patches) vertices += patch.mesh->vertexCount();
+    batch.vertex.resize(vertices);
+    vertices = 0;
     for (const DrawPatch& patch : patches) {
         BatchPatch entry;
         entry.patch = &patch;
+        entry.vertex = batch.vertex.data() + vertices;
+        entry.first_number = uint32_t(number);
         entry.both_sides = settings.two_sided || !patch.one_sided;
-        entry.first_vertex = uint32_t(vertices);
-        entry.first_number = uint32_t(batch.patch_of_block.size() << kNumberBlockBits);
         entry.colour = patchColour(settings, patch);
-        vertices += patch.mesh->vertexCount();
-        const size_t blocks =
-            (patch.mesh->triangleCount() + (1 << kNumberBlockBits) - 1) >> kNumberBlockBits;
-        batch.patch_of_block.insert(batch.patch_of_block.end(), blocks,
-                                    uint32_t(batch.patch.size()));
         batch.patch.push_back(entry);
-        statistics.triangles += patch.mesh->triangleCount();
+        vertices += patch.mesh->vertexCount();
+        number += patch.mesh->triangleCount();
     }
+    statistics.triangles += number;
     statistics.patches += patches.size();
-    batch.vertex.resize(vertices);
 }
 
-void Rasteriser::State::transform(BatchPatch& entry) {
-    const Mesh& mesh = *entry.patch->mesh;
+void Rasteriser::State::transform(BatchPatch& entry) const {
+    const Mesh& mesh = entry.mesh();
     CHECK_EQ(mesh.normal.size(), mesh.position.size());
+    const ImageBounds bounds =
+        transformVertices(projection, mesh.position, mesh.normal, entry.vertex);
+    entry.whole = bounds.whole;
+    entry.box = screen();
+    if (entry.whole)
+        entry.box = entry.box.intersected(
+            {bounds.min_x >> kSubpixelBits, bounds.min_y >> kSubpixelBits,
+             (bounds.max_x >> kSubpixelBits) + 1, (bounds.max_y >> kSubpixelBits) + 1});
+}
+
+PixelBox Rasteriser::State::boxOf(const DrawChunk& chunk) const {
     int32_t min_x = std::numeric_limits<int32_t>::max(),
             max_x = std::numeric_limits<int32_t>::lowest();
     int32_t min_y = min_x, max_y = max_x;
-    for (size_t i = 0; i < mesh.vertexCount(); ++i) {
-        ScreenVertex v = projection.project(projection.viewPosition(mesh.position[i]));
-        v.normal = mesh.normal[i];
-        batch.vertex[entry.first_vertex + i] = v;
-        if (v.x == kNoImage) {
-            entry.whole = false;
-        } else {
+    for (uint32_t i = 0; i < chunk.count; ++i)
+        for (const uint32_t index : chunk.patch->triangle()[chunk.first + i]) {
+            const ScreenVertex& v = chunk.patch->vertex[index];
+            if (v.x == kNoImage) return screen();
             min_x = std::min(min_x, v.x);
             max_x = std::max(max_x, v.x);
             min_y = std::min(min_y, v.y);
             max_y = std::max(max_y, v.y);
         }
-    }
-    entry.box = screen();
-    if (entry.whole)
-        entry.box =
-            entry.box.intersected({min_x >> kSubpixelBits, min_y >> kSubpixelBits,
-                                   (max_x >> kSubpixelBits) + 1, (max_y >> kSubpixelBits) + 1});
+    return screen().intersected({min_x >> kSubpixelBits, min_y >> kSubpixelBits,
+                                 (max_x >> kSubpixelBits) + 1, (max_y >> kSubpixelBits) + 1});
 }
 
-void Rasteriser::State::drawPatch(const BatchPatch& entry, const VisibilityTile& tile) {
-    const Mesh& mesh = *entry.patch->mesh;
-    const ScreenVertex* vertex = batch.vertex.data() + entry.first_vertex;
-    uint32_t number = entry.first_number;
-    for (const Triangle& t : mesh.triangle) {
-        const ScreenVertex v[3] = {vertex[t[0]], vertex[t[1]], vertex[t[2]]};
-        if (v[0].x != kNoImage && v[1].x != kNoImage && v[2].x != kNoImage) {
-            drawTriangle(tile,
-                         {ScreenPoint{v[0].x, v[0].y, v[0].inv_depth},
-                          {v[1].x, v[1].y, v[1].inv_depth},
-                          {v[2].x, v[2].y, v[2].inv_depth}},
-                         entry.both_sides, number);
-        } else {
-            const ScreenPolygon p = clipTriangle(
-                projection, {mesh.position[t[0]], mesh.position[t[1]], mesh.position[t[2]]});
-            for (int k = 2; k < p.count; ++k)
-                drawTriangle(tile, {p.point[0], p.point[k - 1], p.point[k]}, entry.both_sides,
-                             number);
-        }
-        ++number;
+std::vector<DrawChunk> Rasteriser::State::makeChunks() const {
+    std::vector<DrawChunk> chunks;
+    for (const BatchPatch& patch : batch.patch) {
+        const size_t triangles = patch.mesh().triangleCount();
+        if (patch.box.empty()) continue;
+        const size_t step = triangles <= 2 * kChunkTriangles ? triangles : kChunkTriangles;
+        for (size_t first = 0; first < triangles; first += step)
+            chunks.push_back(
+                {&patch, uint32_t(first), uint32_t(std::min(step, triangles - first)), patch.box});
+    }
+    parallelForSlices(chunks.size(), 16, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i)
+            if (chunks[i].count < chunks[i].patch->mesh().triangleCount())
+                chunks[i].box = boxOf(chunks[i]);
+    });
+    std::erase_if(chunks, [](const DrawChunk& chunk) { return chunk.box.empty(); });
+    return chunks;
+}
+
+void Rasteriser::State::drawChunk(const DrawChunk& chunk, const VisibilityTile& tile) const {
+    const BatchPatch& patch = *chunk.patch;
+    thread_local std::vector<uint32_t> clipped;
+    clipped.clear();
+    prefetchBytes(patch.vertex, patch.mesh().vertexCount() * sizeof(ScreenVertex));
+    const PixelBox box = chunk.box.intersected(tile.box);
+    for (int32_t y = box.y0; y < box.y1; ++y)
+        prefetchBytes(
+            tile.key + (size_t(y) * size_t(tile.width) + size_t(box.x0)) * size_t(tile.samples),
+            size_t(box.x1 - box.x0) * size_t(tile.samples) * sizeof(VisibilityKey));
+    drawTriangles(tile,
+                  {patch.triangle() + chunk.first, chunk.count, chunk.firstNumber(), patch.vertex,
+                   patch.both_sides},
+                  clipped);
+    for (const uint32_t i : clipped) {
+        const Triangle& t = patch.triangle()[chunk.first + i];
+        const std::vector<Vec3i>& position = patch.mesh().position;
+        const ScreenPolygon p =
+            clipTriangle(projection, {position[t[0]], position[t[1]], position[t[2]]});
+        for (int k = 2; k < p.count; ++k)
+            drawTriangle(tile, {p.point[0], p.point[k - 1], p.point[k]}, patch.both_sides,
+                         chunk.firstNumber() + i);
     }
 }
 
-void Rasteriser::State::resolve(const PixelShader& shader, const PixelBox& box) {
-    for (int y = box.y0; y < box.y1; ++y)
-        for (int x = box.x0; x < box.x1; ++x) {
-            const size_t pixel = picture.index(x, y);
-            if (samples == 1) {
-                if (key[pixel] == 0 || uint32_t(key[pixel]) == kResolved) continue;
-                picture.colour[pixel] = shader.shade(batch, triangleNumber(key[pixel]), x, y);
-                key[pixel] |= kResolved;
-                continue;
-            }
-            VisibilityKey* sample = &key[4 * pixel];
-            for (int s = 0; s < 4; ++s) {
-                if (sample[s] == 0 || uint32_t(sample[s]) == kResolved) continue;
-                const uint32_t low = uint32_t(sample[s]);
-                const Rgba8 colour = shader.shade(batch, triangleNumber(sample[s]), x, y);
-                for (int t = s; t < 4; ++t)
-                    if (uint32_t(sample[t]) == low && sample[t] != 0) {
-                        sample_colour[4 * pixel + size_t(t)] = colour;
-                        sample[t] |= kResolved;
-                    }
-            }
-        }
-}
-
-Rgba8 Rasteriser::State::averagedColour(size_t pixel, const Vec3f& background) const {
-    const Rgba8* colour = &sample_colour[4 * pixel];
-    Vec3f sum(0, 0, 0);
-    bool same = true;
-    for (int s = 0; s < 4; ++s) {
-        const bool covered = key[4 * pixel + size_t(s)] != 0;
-        same = same && covered && colour[s] == colour[0];
-        sum += covered ? linearFromSrgb(colour[s]) : background;
-    }
-    return same ? colour[0] : srgbFromLinear(sum * 0.25f);
-}
-
-void Rasteriser::State::finishRow(int y) {
-    const Vec3f background = backgroundColour(settings, y, picture.size.height);
-    const Rgba8 background_byte = srgbFromLinear(background);
-    for (int x = 0; x < picture.size.width; ++x) {
-        const size_t pixel = picture.index(x, y);
-        VisibilityKey nearest = 0;
-        for (int s = 0; s < samples; ++s)
-            nearest = std::max(nearest, key[pixel * size_t(samples) + size_t(s)]);
-        picture.depth[pixel] = nearest == 0 ? std::numeric_limits<float>::infinity()
-                                            : 1 / std::bit_cast<float>(uint32_t(nearest >> 32));
-        if (nearest == 0)
-            picture.colour[pixel] = background_byte;
-        else if (samples == 4)
-            picture.colour[pixel] = averagedColour(pixel, background);
-    }
+void Rasteriser::State::drawTiles(const std::vector<DrawChunk>& chunks) {
+    const std::vector<DrawTile> tiles =
+        makeTiles(chunks, screen(), kTilesPerThread * threadCount());
+    const PixelShader shader(view, projection, settings);
+    Rgba8* colour = samples == 1 ? picture.colour.data() : sample_colour.data();
+    std::atomic<int64_t> raster_ns{0}, shade_ns{0};
+    Stopwatch watch;
+    parallelFor(tiles.size(), [&](size_t i) {
+        Stopwatch tile_watch;
+        const VisibilityTile tile{key.data(), picture.size.width, samples, tiles[i].box};
+        for (const uint32_t chunk : tiles[i].chunk) drawChunk(chunks[chunk], tile);
+        raster_ns += int64_t(tile_watch.ms() * 1e6);
+        for (const uint32_t chunk : tiles[i].chunk)
+            resolveChunk(tile, chunks[chunk], shader, colour);
+        shade_ns += int64_t(tile_watch.ms() * 1e6);
+    });
+    const double wall = watch.ms(), busy = double(raster_ns + shade_ns);
+    statistics.raster_ms += busy > 0 ? wall * double(raster_ns) / busy : wall;
+    statistics.shade_ms += busy > 0 ? wall * double(shade_ns) / busy : 0;
 }
 
 Rasteriser::Rasteriser(const View& view, const Lattice& lattice, int samples,
@@ -216,32 +223,23 @@ void Rasteriser::setModel(const View& view, const Lattice& lattice) {
 
 void Rasteriser::draw(std::span<const DrawPatch> patches) {
     State& s = *state_;
+    CHECK(!s.finished);
     Stopwatch watch;
     s.layOut(patches);
     parallelFor(s.batch.patch.size(), [&](size_t i) { s.transform(s.batch.patch[i]); });
+    const std::vector<DrawChunk> chunks = s.makeChunks();
     s.statistics.transform_ms += watch.ms();
-    const PixelShader shader(s.view, s.projection, s.settings);
-    const size_t tiles = size_t(s.picture.size.height + kTileRows - 1) / kTileRows;
-    parallelFor(tiles, [&](size_t i) {
-        const int y = int(i) * kTileRows;
-        const PixelBox box = s.screen().intersected({0, y, s.picture.size.width, y + kTileRows});
-        const VisibilityTile tile{s.key.data(), s.picture.size.width, s.samples, box};
-        for (const BatchPatch& patch : s.batch.patch)
-            if (!patch.box.intersected(box).empty()) s.drawPatch(patch, tile);
-        s.resolve(shader, box);
-    });
-    s.statistics.raster_ms += watch.ms();
+    s.drawTiles(chunks);
 }
 
 const Picture& Rasteriser::finish() {
     State& s = *state_;
+    if (s.finished) return s.picture;
     Stopwatch watch;
-    parallelFor(size_t(s.picture.size.height), [&](size_t y) { s.finishRow(int(y)); });
-    uint64_t covered = 0;
-    for (const float depth : s.picture.depth)
-        covered += depth != std::numeric_limits<float>::infinity();
-    s.statistics.pixels_covered = covered;
+    s.statistics.pixels_covered =
+        finishPicture(s.settings, s.samples, s.key, s.sample_colour, s.picture);
     s.statistics.finish_ms += watch.ms();
+    s.finished = true;
     return s.picture;
 }
 

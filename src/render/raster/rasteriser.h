@@ -38,6 +38,9 @@ struct RasterStatistics {
     double totalMs() const { return transform_ms + raster_ms + shade_ms + finish_ms; }
 };
 
+/// Longest side of a picture, in pixels.
+inline constexpr int kMaxPictureSide = 1 << 14;
+
 class Rasteriser {
 public:
     /// `view` must have been made with `lattice`. `samples`: 1 at the pixel's centre, or 4 on the
@@ -55,7 +58,7 @@ public:
     void setModel(const View& view, const Lattice& lattice);
     /// Draws, and shades what is visible so far: the meshes may vanish afterwards.
     void draw(std::span<const DrawPatch> patches);
-    /// Completes the picture; valid until restart(). draw() must not be called in between.
+    /// Completes the picture, which is valid until restart(); nothing can be drawn in between.
     const Picture& finish();
 
     const RasterStatistics& statistics() const;

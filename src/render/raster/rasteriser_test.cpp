@@ -1,10 +1,14 @@
 #include "render/raster/rasteriser.h"
 
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
+#include <algorithm>
 #include <limits>
 #include <random>
+#include <string>
 
+#include "base/parallel.h"
 #include "render/raster/projection.h"
 #include "render/raster/test_meshes.h"
 
@@ -182,6 +186,277 @@ TEST(Rasteriser, FromInsideAClosedSurfaceNoPixelIsMissedOrDoubled) {
         const std::vector<int> count = countsDrawnAlone(view, mesh, false);
         EXPECT_EQ(std::count(count.begin(), count.end(), 1), 64 * 48) << round;
     }
+}
+
+// Pictures as a whole.
+
+/// A scene with everything in it: micro-triangles, large ones, some before and behind the eye, open
+/// and closed, coloured and plain.
+struct Scene {
+    std::vector<Mesh> meshes;
+    std::vector<DrawPatch> patches;
+    View view{Camera{{500, -700, 900}, {520, 600, 300}, {0, 0, 1}, 60}, {161, 123}, Lattice{}};
+
+    Scene() {
+        meshes.push_back(terrain(60, 50, 1000, 300));
+        meshes.push_back(sphere({300, 300, 500}, 120, 90, 60));
+        meshes.push_back(sphere({600, 500, 400}, 150, 7, 5));
+        meshes.push_back(grid(1, 1, [](double u, double v) {
+            return Vec3d(6000 * u - 2500, 9000 * v - 6000, 150 + 100 * u);
+        }));
+        meshes.push_back(sphere({500, -700, 900}, 40, 12, 8));
+        meshes[1].colour.resize(meshes[1].vertexCount());
+        for (size_t i = 0; i < meshes[1].vertexCount(); ++i)
+            meshes[1].colour[i] = {uint8_t(i * 7), uint8_t(i * 3), uint8_t(255 - i), 255};
+        // The last one, around the eye, from behind only: seen from inside it draws nothing.
+        for (size_t i = 0; i < meshes.size(); ++i)
+            patches.push_back({&meshes[i], i == 1 || i == 4, uint32_t(i), {}, float(i)});
+    }
+};
+
+void expectSame(const Picture& a, const Picture& b, const std::string& what) {
+    EXPECT_EQ(a.depth, b.depth) << what;
+    size_t different = 0;
+    for (size_t i = 0; i < a.colour.size(); ++i) different += a.colour[i] != b.colour[i];
+    EXPECT_EQ(different, 0u) << what;
+}
+
+TEST(Picture, DoesNotDependOnThreadsOrSimdLevel) {
+    const Scene scene;
+    for (const int samples : {1, 4}) {
+        const Picture expected = render(scene.view, scene.patches, samples);
+        for (const int threads : {1, 2, 7}) {
+            const ThreadLimit limit(threads);
+            expectSame(render(scene.view, scene.patches, samples), expected,
+                       std::to_string(threads) + " threads");
+        }
+        for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+            hwy::SetSupportedTargetsForTest(target);
+            hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+            expectSame(render(scene.view, scene.patches, samples), expected,
+                       hwy::TargetName(target));
+            hwy::SetSupportedTargetsForTest(0);
+            hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+        }
+    }
+}
+
+TEST(Picture, DoesNotDependOnHowTheListIsCutIntoCalls) {
+    const Scene scene;
+    for (const int samples : {1, 4}) {
+        const Picture expected = render(scene.view, scene.patches, samples);
+        Rasteriser rasteriser(scene.view, Lattice{}, samples, {});
+        for (const DrawPatch& patch : scene.patches)
+            for (size_t begin = 0; begin < patch.mesh->triangleCount(); begin += 500) {
+                // The mesh is gone as soon as it is drawn.
+                const Mesh piece =
+                    part(*patch.mesh, begin, std::min(begin + 500, patch.mesh->triangleCount()));
+                DrawPatch small = patch;
+                small.mesh = &piece;
+                rasteriser.draw({&small, 1});
+            }
+        rasteriser.draw({});
+        expectSame(rasteriser.finish(), expected, std::to_string(samples));
+        // And again in the same memory.
+        rasteriser.restart(scene.view, Lattice{}, {});
+        rasteriser.draw(scene.patches);
+        expectSame(rasteriser.finish(), expected, "restarted");
+    }
+}
+
+TEST(Picture, IsTheSameWhereverOnEarthTheModelLies) {
+    const Scene scene;
+    const Camera camera{{500, -700, 900}, {520, 600, 300}, {0, 0, 1}, 60};
+    const Picture expected = render(scene.view, scene.patches);
+    Lattice lattice;
+    lattice.origin = Vec3d(4.5e6, 5.6e6, -1.0e5);
+    lattice.step = 0.125;
+    const auto moved = [&](const Vec3d& p) { return lattice.toInput(p); };
+    const View view(Camera{moved(camera.eye), moved(camera.target), camera.up, camera.fovy_deg},
+                    {161, 123}, lattice);
+    Rasteriser rasteriser(view, lattice, 1, {});
+    rasteriser.draw(scene.patches);
+    const Picture& picture = rasteriser.finish();
+    EXPECT_EQ(covered(picture), covered(expected));
+    for (size_t i = 0; i < expected.depth.size(); ++i) {
+        ASSERT_EQ(picture.colour[i], expected.colour[i]);
+        if (expected.depth[i] != kNothing) {
+            ASSERT_EQ(picture.depth[i], expected.depth[i] * 0.125f);
+        }
+    }
+}
+
+/// What a ray through the pixel's centre meets first; negative where it passes within `margin`
+/// (relative to the triangle's size in the picture) of an edge.
+float traced(const View& view, std::span<const DrawPatch> patches, int x, int y, double margin) {
+    const Vec3d ray = view.right() * ((x + 0.5 - view.size().width * 0.5) / view.focal_px()) -
+                      view.up() * ((y + 0.5 - view.size().height * 0.5) / view.focal_px()) -
+                      view.back();
+    double nearest = kNothing;
+    for (const DrawPatch& patch : patches)
+        for (const Triangle& t : patch.mesh->triangle) {
+            Vec3d v[3];
+            for (int k = 0; k < 3; ++k) v[k] = Vec3d(patch.mesh->position[t[k]]) - view.eye();
+            const Vec3d n = glm::cross(v[1] - v[0], v[2] - v[0]);
+            const double depth = glm::dot(n, v[0]) / glm::dot(n, ray);
+            if (!(depth > kNearDepth)) continue;
+            if (patch.one_sided && glm::dot(n, ray) > 0) continue;
+            double least = 1e300;
+            for (int k = 0; k < 3; ++k) {
+                const Vec3d a = v[k], b = v[(k + 1) % 3];
+                const Vec3d side = glm::cross(b - a, ray * depth - a);
+                least = std::min(least, glm::dot(side, n) / (glm::length(n) * glm::length(b - a)) /
+                                            depth * view.focal_px());
+            }
+            if (std::abs(least) < margin) return -1;
+            if (least > 0) nearest = std::min(nearest, depth);
+        }
+    return float(nearest);
+}
+
+TEST(Picture, ShowsWhatRaysMeet) {
+    Scene scene;
+    // Close to the ground, so that many triangles reach behind the eye.
+    for (const Camera& camera : {Camera{{500, -700, 900}, {520, 600, 300}, {0, 0, 1}, 60},
+                                 Camera{{410, 420, 250}, {700, 500, 180}, {0, 0, 1}, 110},
+                                 Camera{{100, 800, 310}, {600, 100, 150}, {0, 0, 1}, 80}}) {
+        const View view(camera, {67, 53}, Lattice{});
+        const Picture picture = render(view, scene.patches);
+        int compared = 0, covered = 0;
+        for (int y = 0; y < 53; ++y)
+            for (int x = 0; x < 67; ++x) {
+                // Grazing triangles: a vertex moved by half a 1/256 pixel moves a depth by more.
+                const float expected = traced(view, scene.patches, x, y, 0.02);
+                if (expected < 0) continue;
+                ++compared;
+                const float depth = picture.depth[picture.index(x, y)];
+                if (expected == kNothing) {
+                    EXPECT_EQ(depth, kNothing) << x << " " << y;
+                } else {
+                    ++covered;
+                    EXPECT_NEAR(depth / expected, 1, 0.01) << x << " " << y;
+                }
+            }
+        EXPECT_GT(compared, 67 * 53 * 2 / 3);
+        EXPECT_GT(covered, 500);
+    }
+}
+
+TEST(Picture, OneSidedPatchesAreCulledUnlessTheSettingsSayOtherwise) {
+    const Mesh mesh = grid(2, 2, [](double u, double v) { return Vec3d(1000 * v, 1000 * u, 0); });
+    const View view = flatView(40, 40, 0.02, {500, 500, 0});  // sees the backs
+    const DrawPatch one{&mesh, true, 0, {}, 0}, both{&mesh, false, 0, {}, 0};
+    ShadeSettings settings;
+    EXPECT_EQ(std::ranges::count(covered(render(view, {&one, 1}, 1, settings)), 1), 0);
+    EXPECT_EQ(std::ranges::count(covered(render(view, {&both, 1}, 1, settings)), 1), 400);
+    settings.two_sided = true;
+    EXPECT_EQ(std::ranges::count(covered(render(view, {&one, 1}, 1, settings)), 1), 400);
+}
+
+TEST(Picture, BothSidesAreLitAlike) {
+    const auto plane = [](double u, double v) { return Vec3d(1000 * u, 1000 * v, 0); };
+    const Mesh front = grid(2, 2, plane);
+    Mesh back = front;
+    for (Triangle& t : back.triangle) std::swap(t[1], t[2]);
+    computeNormals(back);
+    const View view = flatView(40, 40, 0.02, {500, 500, 0});
+    const Picture a = render(view, front), b = render(view, back);
+    EXPECT_EQ(a.colour, b.colour);
+    EXPECT_GT(a.colour[a.index(20, 20)].r, 120);
+}
+
+TEST(Picture, ColoursAreInterpolatedInPerspectiveAlsoAcrossTheEye) {
+    // A long floor from behind the eye to the horizon, red to the left and green to the right, as
+    // two triangles and as many: the same colours, whatever is clipped.
+    const auto floor = [](double u, double v) { return Vec3d(16000 * u, 64000 * v, 0); };
+    const auto coloured = [&](int columns, int rows) {
+        Mesh mesh = grid(columns, rows, floor);
+        for (int j = 0; j <= rows; ++j)
+            for (int i = 0; i <= columns; ++i) {
+                const float t = float(i) / float(columns);
+                mesh.colour.push_back(srgbFromLinear(Vec3f(1 - t, t, float(j) / float(rows))));
+            }
+        return mesh;
+    };
+    const Mesh coarse = coloured(1, 1), fine = coloured(16, 64);
+    const View view(Camera{{8000, 8000, 900}, {8300, 30000, 500}, {0, 0, 1}, 70}, {80, 60},
+                    Lattice{});
+    ShadeSettings settings;
+    settings.show = Show::kColour;
+    const DrawPatch a{&coarse, false, 0, {}, 0}, b{&fine, false, 0, {}, 0};
+    const Picture one = render(view, {&a, 1}, 1, settings),
+                  many = render(view, {&b, 1}, 1, settings);
+    EXPECT_EQ(covered(one), covered(many));
+    for (size_t i = 0; i < one.colour.size(); ++i) {
+        EXPECT_NEAR(one.colour[i].r, many.colour[i].r, 2) << i;
+        EXPECT_NEAR(one.colour[i].g, many.colour[i].g, 2) << i;
+        EXPECT_NEAR(one.colour[i].b, many.colour[i].b, 3) << i;
+    }
+}
+
+TEST(Picture, FourSamplesAverageInLinearLight) {
+    // A white and a black square side by side; their border runs through the middle of a pixel.
+    const Mesh mesh = grid(2, 1, [](double u, double v) { return Vec3d(6400 * u, 3200 * v, 0); });
+    std::vector<Mesh> halves{part(mesh, 0, 2), part(mesh, 2, 4)};
+    halves[0].colour.assign(halves[0].vertexCount(), Rgba8{255, 255, 255, 255});
+    halves[1].colour.assign(halves[1].vertexCount(), Rgba8{0, 0, 0, 255});
+    const std::vector<DrawPatch> patches{{&halves[0], false, 0, {}, 0},
+                                         {&halves[1], false, 1, {}, 0}};
+    const View view = flatView(15, 9, 0.005, {3200, 1600, 0});
+    ShadeSettings settings;
+    settings.show = Show::kColour;
+    const Picture picture = render(view, patches, 4, settings);
+    EXPECT_EQ(picture.colour[picture.index(6, 4)].g, 255);
+    EXPECT_EQ(picture.colour[picture.index(8, 4)].g, 0);
+    EXPECT_EQ(picture.colour[picture.index(7, 4)].g, srgbFromLinear(0.5f));
+}
+
+TEST(Picture, ViewsShowWhatTheyName) {
+    Scene scene;
+    scene.meshes[0].scalar.resize(scene.meshes[0].vertexCount() * 2);
+    for (size_t i = 0; i < scene.meshes[0].vertexCount(); ++i)
+        scene.meshes[0].scalar[2 * i + 1] = float(scene.meshes[0].position[i].x);
+    std::vector<Picture> seen;
+    for (const Show show : {Show::kShaded, Show::kNormals, Show::kDepth, Show::kLod, Show::kPatches,
+                            Show::kTriangles, Show::kError, Show::kColour, Show::kScalar}) {
+        ShadeSettings settings;
+        settings.show = show;
+        settings.scalar_count = 2;
+        settings.scalar_index = 1;
+        settings.scalar_max = 1000;
+        settings.value_max = 4;
+        const Picture picture = render(scene.view, scene.patches, 1, settings);
+        for (const Picture& other : seen) {
+            EXPECT_EQ(other.depth, picture.depth);
+            EXPECT_NE(other.colour, picture.colour);
+        }
+        seen.push_back(picture);
+    }
+}
+
+TEST(Picture, EmptyListsAndEmptyMeshesGiveBackground) {
+    const View view = flatView(7, 5, 1, {0, 0, 0});
+    const Mesh nothing;
+    const DrawPatch patch{&nothing, false, 0, {}, 0};
+    ShadeSettings settings;
+    settings.background_top = settings.background_bottom = {10, 20, 30, 255};
+    const Picture picture = render(view, {&patch, 1}, 4, settings);
+    EXPECT_EQ(picture.colour, std::vector<Rgba8>(35, Rgba8{10, 20, 30, 255}));
+    EXPECT_EQ(picture.depth, std::vector<float>(35, kNothing));
+}
+
+TEST(Picture, StatisticsCountWhatWasDrawn) {
+    const Scene scene;
+    Rasteriser rasteriser(scene.view, Lattice{}, 1, {});
+    rasteriser.draw(scene.patches);
+    const Picture& picture = rasteriser.finish();
+    size_t triangles = 0;
+    for (const Mesh& mesh : scene.meshes) triangles += mesh.triangleCount();
+    EXPECT_EQ(rasteriser.statistics().patches, scene.patches.size());
+    EXPECT_EQ(rasteriser.statistics().triangles, triangles);
+    EXPECT_EQ(rasteriser.statistics().pixels_covered,
+              uint64_t(std::ranges::count(covered(picture), 1)));
+    EXPECT_GT(rasteriser.statistics().totalMs(), 0);
 }
 
 }  // namespace

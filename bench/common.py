@@ -1,0 +1,71 @@
+"""What the benchmark scripts share: the program, inputs, temporary folders, tables."""
+import gzip
+import json
+import os
+import pathlib
+import shutil
+import statistics
+import subprocess
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+SHARED = pathlib.Path(os.environ.get("PIETRA_SHARED", ROOT.parent / "shared"))
+PIETRA = ROOT / "build/release/pietra"
+
+
+def pietra(*arguments, check=True):
+    """Runs the program quietly; the completed process."""
+    run = subprocess.run([PIETRA, *map(str, arguments), "--progress", "none"], capture_output=True,
+                         text=True)
+    if check and run.returncode != 0:
+        raise SystemExit(f"pietra {' '.join(map(str, arguments))}: exit {run.returncode}\n{run.stderr}")
+    return run
+
+
+def report(verb, *arguments, folder, wrap=()):
+    """Runs a verb with --report and returns the report."""
+    path = pathlib.Path(folder) / "report.json"
+    command = [*wrap, PIETRA, verb, *map(str, arguments), "--force", "--progress", "none", "--report",
+               path]
+    run = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    if run.returncode != 0:
+        raise SystemExit(f"{' '.join(map(str, command))}: exit {run.returncode}\n{run.stderr}")
+    return json.loads(path.read_text())
+
+
+def shared_mesh(name, folder):
+    """Path of a mesh of the shared data, unpacked where it has to be; None where it is absent."""
+    path = SHARED / "data" / name
+    if not path.exists():
+        return None
+    if path.suffix != ".gz":
+        return path
+    plain = pathlib.Path(folder) / path.stem
+    if not plain.exists():
+        with gzip.open(path) as packed, open(plain, "wb") as out:
+            shutil.copyfileobj(packed, out)
+    return plain
+
+
+def moon(folder, *arguments, name):
+    """A PLY of the Moon's relief, made by the shared tool; None where that is absent."""
+    source = SHARED / "tools/moon_to_ply.cpp"
+    if not source.exists() or not shutil.which("djxl"):
+        return None
+    tool, out = pathlib.Path(folder) / "moon_to_ply", pathlib.Path(folder) / name
+    if not tool.exists():
+        subprocess.run(["g++", "-O2", "-std=c++20", "-o", tool, source], check=True)
+    if not out.exists():
+        subprocess.run([tool, SHARED / "data/moon", out, *map(str, arguments)], check=True,
+                       stdout=subprocess.DEVNULL)
+    return out
+
+
+def median(values):
+    return statistics.median(values)
+
+
+def table(header, rows):
+    """A Markdown table."""
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
+    return "\n".join(lines)

@@ -1,0 +1,125 @@
+#include "render/raster/finish_picture.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <limits>
+
+#include "base/parallel.h"
+
+namespace pietra {
+namespace {
+
+constexpr float kNothing = std::numeric_limits<float>::infinity();
+constexpr size_t kRowGrain = 16;
+
+float depthOf(VisibilityKey key) {
+    return 1 / std::bit_cast<float>(uint32_t(key >> 32));
+}
+
+/// Averages four sRGB colours in linear light, by tables of integers.
+class Averager {
+public:
+    Rgba8 average(const Rgba8* c) const {
+        return {average(c[0].r, c[1].r, c[2].r, c[3].r), average(c[0].g, c[1].g, c[2].g, c[3].g),
+                average(c[0].b, c[1].b, c[2].b, c[3].b), 255};
+    }
+
+private:
+    uint8_t average(uint8_t a, uint8_t b, uint8_t c, uint8_t d) const {
+        static_assert(kLinearUnits == 8 * (kSrgbEntries - 1));
+        const uint32_t sum = uint32_t(units_[a]) + units_[b] + units_[c] + units_[d];
+        return srgb_[(sum + 16) >> 5];
+    }
+    const uint16_t* units_ = linearUnitTable();
+    const uint8_t* srgb_ = srgbTable();
+};
+
+using Background = std::array<Rgba8, 4>;
+
+struct Row {
+    VisibilityKey* key;
+    const Rgba8* sample_colour;
+    Rgba8* colour;
+    float* depth;
+    size_t width;
+};
+
+/// These return how many pixels are covered.
+uint64_t finishRowOfOne(const Row& row, const Background& background) {
+    uint64_t covered = 0;
+    for (size_t x = 0; x < row.width; ++x) {
+        const VisibilityKey key = row.key[x];
+        const bool empty = key == 0;
+        row.depth[x] = empty ? kNothing : depthOf(key);
+        row.colour[x] = empty ? background[x & 3] : row.colour[x];
+        row.key[x] = 0;
+        covered += !empty;
+    }
+    return covered;
+}
+
+uint64_t finishRowOfFour(const Row& row, const Background& background, const Averager& averager) {
+    uint64_t covered = 0;
+    for (size_t x = 0; x < row.width; ++x) {
+        VisibilityKey* key = row.key + 4 * x;
+        const VisibilityKey nearest = std::max({key[0], key[1], key[2], key[3]});
+        if (nearest == 0) {
+            row.depth[x] = kNothing;
+            row.colour[x] = background[x & 3];
+            continue;
+        }
+        Rgba8 colour[4];
+        for (size_t s = 0; s < 4; ++s)
+            colour[s] = key[s] == 0 ? background[x & 3] : row.sample_colour[4 * x + s];
+        row.depth[x] = depthOf(nearest);
+        row.colour[x] = averager.average(colour);
+        std::fill_n(key, 4, VisibilityKey(0));
+        ++covered;
+    }
+    return covered;
+}
+
+/// Show::kDepth: light where it is near, with the range of the picture.
+void paintDepth(Picture& picture) {
+    float nearest = kNothing, farthest = 0;
+    for (const float depth : picture.depth)
+        if (depth != kNothing) {
+            nearest = std::min(nearest, depth);
+            farthest = std::max(farthest, depth);
+        }
+    const float scale = farthest > nearest ? 0.9f / (farthest - nearest) : 0;
+    for (size_t i = 0; i < picture.pixelCount(); ++i) {
+        const float depth = picture.depth[i];
+        if (depth == kNothing) continue;
+        const auto grey = uint8_t((1 - (depth - nearest) * scale) * 255 + 0.5f);
+        picture.colour[i] = {grey, grey, grey, 255};
+    }
+}
+
+}  // namespace
+
+uint64_t finishPicture(const ShadeSettings& settings, int samples, std::vector<VisibilityKey>& key,
+                       const std::vector<Rgba8>& sample_colour, Picture& picture) {
+    const size_t width = size_t(picture.size.width);
+    const Averager averager;
+    std::atomic<uint64_t> covered{0};
+    parallelForSlices(size_t(picture.size.height), kRowGrain, [&](size_t begin, size_t end) {
+        uint64_t count = 0;
+        for (size_t y = begin; y < end; ++y) {
+            const size_t first = y * width;
+            const Background background = backgroundRow(settings, int(y), picture.size.height);
+            const Row row{key.data() + first * size_t(samples),
+                          samples == 1 ? nullptr : sample_colour.data() + 4 * first,
+                          picture.colour.data() + first, picture.depth.data() + first, width};
+            count += samples == 1 ? finishRowOfOne(row, background)
+                                  : finishRowOfFour(row, background, averager);
+        }
+        covered += count;
+    });
+    if (settings.show == Show::kDepth) paintDepth(picture);
+    return covered;
+}
+
+}  // namespace pietra

@@ -1,0 +1,23 @@
+#pragma once
+// Cutting the picture among the threads: rectangles with about equal work, so that each is drawn by
+// one thread without locks. Pieces of work on a border are set up by the rectangles on both sides,
+// so the cuts are as few as the threads need.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "render/raster/batch.h"
+
+namespace pietra {
+
+struct DrawTile {
+    PixelBox box;
+    std::vector<uint32_t> chunk;  ///< touching the tile, ascending
+};
+
+/// Disjoint tiles that together hold all chunks' boxes, at most `tiles` of them; costly ones first.
+std::vector<DrawTile> makeTiles(std::span<const DrawChunk> chunks, const PixelBox& screen,
+                                size_t tiles);
+
+}  // namespace pietra

@@ -1,0 +1,64 @@
+#include "render/raster/tiling.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+namespace pietra {
+namespace {
+
+constexpr PixelBox kScreen{0, 0, 300, 200};
+
+std::vector<DrawChunk> randomChunks(std::mt19937& random, size_t count, int largest) {
+    std::vector<DrawChunk> chunks;
+    while (chunks.size() < count) {
+        const int32_t x = int32_t(random() % 300), y = int32_t(random() % 200);
+        const PixelBox box = PixelBox{x, y, x + 1 + int32_t(random() % unsigned(largest)),
+                                      y + 1 + int32_t(random() % unsigned(largest))}
+                                 .intersected(kScreen);
+        chunks.push_back({nullptr, 0, uint32_t(1 + random() % 5000), box});
+    }
+    return chunks;
+}
+
+TEST(Tiling, TilesAreDisjointAndHoldEveryPartOfEveryChunk) {
+    std::mt19937 random(1);
+    for (const size_t count : {1u, 7u, 200u})
+        for (const int largest : {1, 20, 300})
+            for (const size_t wanted : {1u, 2u, 8u, 50u}) {
+                const std::vector<DrawChunk> chunks = randomChunks(random, count, largest);
+                const std::vector<DrawTile> tiles = makeTiles(chunks, kScreen, wanted);
+                EXPECT_LE(tiles.size(), wanted);
+                std::vector<int> owner(300 * 200, -1);
+                for (size_t t = 0; t < tiles.size(); ++t)
+                    for (int y = tiles[t].box.y0; y < tiles[t].box.y1; ++y)
+                        for (int x = tiles[t].box.x0; x < tiles[t].box.x1; ++x) {
+                            ASSERT_EQ(owner[y * 300 + x], -1);
+                            owner[y * 300 + x] = int(t);
+                        }
+                for (uint32_t i = 0; i < chunks.size(); ++i)
+                    for (int y = chunks[i].box.y0; y < chunks[i].box.y1; ++y)
+                        for (int x = chunks[i].box.x0; x < chunks[i].box.x1; ++x) {
+                            const int t = owner[y * 300 + x];
+                            ASSERT_GE(t, 0);
+                            const std::vector<uint32_t>& listed = tiles[t].chunk;
+                            ASSERT_TRUE(std::binary_search(listed.begin(), listed.end(), i));
+                        }
+            }
+}
+
+TEST(Tiling, WorkIsShared) {
+    std::mt19937 random(2);
+    const std::vector<DrawChunk> chunks = randomChunks(random, 3000, 10);
+    const std::vector<DrawTile> tiles = makeTiles(chunks, kScreen, 8);
+    EXPECT_EQ(tiles.size(), 8u);
+    for (const DrawTile& tile : tiles) {
+        EXPECT_GT(tile.chunk.size(), 200u);
+        EXPECT_LT(tile.chunk.size(), 700u);
+    }
+    EXPECT_TRUE(makeTiles({}, kScreen, 8).empty());
+}
+
+}  // namespace
+}  // namespace pietra

@@ -1,0 +1,281 @@
+#include "simplify/edge_kernels.h"
+
+#include <cstddef>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "simplify/edge_kernels.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace pietra::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using PlaceTag = HWY_CAPPED(float, 16);
+using FoldTag = HWY_CAPPED(float, 8);
+static_assert(kBatch % 16 == 0 && kFoldBatch == 8);
+
+template <class V>
+struct V3 {
+    V x, y, z;
+};
+template <class V>
+HWY_INLINE V3<V> operator+(const V3<V>& a, const V3<V>& b) {
+    return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+template <class V>
+HWY_INLINE V3<V> operator-(const V3<V>& a, const V3<V>& b) {
+    return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+template <class V>
+HWY_INLINE V dot(const V3<V>& a, const V3<V>& b) {
+    return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
+}
+template <class V>
+HWY_INLINE V3<V> cross(const V3<V>& a, const V3<V>& b) {
+    return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)),
+            hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
+            hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
+}
+template <class M, class V>
+HWY_INLINE V3<V> select(M mask, const V3<V>& yes, const V3<V>& no) {
+    return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y),
+            hn::IfThenElse(mask, yes.z, no.z)};
+}
+
+/// Four floats of each lane's record.
+template <class V>
+struct Columns {
+    V c0, c1, c2, c3;
+    HWY_INLINE V3<V> xyz() const { return {c0, c1, c2}; }
+};
+
+static_assert(offsetof(Quadric, a02) == 16 && offsetof(Quadric, b0) == 32);
+
+#if HWY_TARGET == HWY_SCALAR
+
+using Row = Columns<hn::Vec<PlaceTag>>;
+
+HWY_INLINE Row loadRow(const void* record, size_t row) {
+    const float* f = static_cast<const float*>(record) + 4 * row;
+    const PlaceTag d;
+    return {hn::Load(d, f), hn::Load(d, f + 1), hn::Load(d, f + 2), hn::Load(d, f + 3)};
+}
+
+HWY_INLINE Row addRows(const Row& a, const Row& b) {
+    return {hn::Add(a.c0, b.c0), hn::Add(a.c1, b.c1), hn::Add(a.c2, b.c2), hn::Add(a.c3, b.c3)};
+}
+
+template <class D, class Load>
+HWY_INLINE Row gather(D, const Load& load) {
+    return load(0);
+}
+
+#else
+
+using RowTag = HWY_CAPPED(float, 4);
+using Row = hn::Vec<RowTag>;
+
+HWY_INLINE Row loadRow(const void* record, size_t row) {
+    return hn::Load(RowTag(), static_cast<const float*>(record) + 4 * row);
+}
+
+HWY_INLINE Row addRows(const Row& a, const Row& b) {
+    return hn::Add(a, b);
+}
+
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE Columns<V> transpose(D d, V r0, V r1, V r2, V r3) {
+    const V t0 = hn::InterleaveLower(d, r0, r2), t1 = hn::InterleaveLower(d, r1, r3);
+    const V t2 = hn::InterleaveUpper(d, r0, r2), t3 = hn::InterleaveUpper(d, r1, r3);
+    return {hn::InterleaveLower(d, t0, t1), hn::InterleaveUpper(d, t0, t1),
+            hn::InterleaveLower(d, t2, t3), hn::InterleaveUpper(d, t2, t3)};
+}
+
+/// One row of each 128-bit block: lanes i, i + 4, ...
+template <class Load>
+HWY_INLINE Row rowsOf(RowTag, const Load& load, size_t i) {
+    return load(i);
+}
+template <class D, class Load>
+HWY_INLINE hn::Vec<D> rowsOf(D d, const Load& load, size_t i) {
+    const hn::Half<D> half;
+    return hn::Combine(d, rowsOf(half, load, i + hn::MaxLanes(half)), rowsOf(half, load, i));
+}
+
+/// load(i): the four floats of lane i's record.
+template <class D, class Load>
+HWY_INLINE Columns<hn::Vec<D>> gather(D d, const Load& load) {
+    return transpose(d, rowsOf(d, load, 0), rowsOf(d, load, 1), rowsOf(d, load, 2),
+                     rowsOf(d, load, 3));
+}
+
+#endif
+
+/// Row `row` of each lane's record. note: no lambdas; g++ 12 does not inline all of them.
+template <class Record>
+struct RowOf {
+    const Record* records;
+    const uint32_t* ids;
+    size_t row;
+    HWY_INLINE Row operator()(size_t i) const { return loadRow(records + ids[i], row); }
+};
+
+/// The sum of rows of two records.
+struct RowOfBoth {
+    const Quadric* records;
+    const uint32_t *u, *v;
+    size_t row;
+    HWY_INLINE Row operator()(size_t i) const {
+        return addRows(loadRow(records + u[i], row), loadRow(records + v[i], row));
+    }
+};
+
+template <class D>
+HWY_INLINE V3<hn::Vec<D>> positionsOf(D d, const Point* points, const uint32_t* ids) {
+    return gather(d, RowOf<Point>{points, ids, 0}).xyz();
+}
+
+template <class V>
+struct Symmetric {
+    V a00, a11, a22, a01, a02, a12;
+
+    HWY_INLINE V3<V> times(const V3<V>& z) const {
+        return {dot({a00, a01, a02}, z), dot({a01, a11, a12}, z), dot({a02, a12, a22}, z)};
+    }
+
+    /// Solves A z = -g by LDL'.
+    template <class D>
+    HWY_INLINE V3<V> solveNegative(D d, const V3<V>& g) const {
+        const V one = hn::Set(d, 1.0f);
+        const V r0 = hn::Div(one, a00);
+        const V l10 = hn::Mul(a01, r0), l20 = hn::Mul(a02, r0);
+        const V d1 = hn::Sub(a11, hn::Mul(l10, a01));
+        const V t21 = hn::Sub(a12, hn::Mul(l20, a01));
+        const V r1 = hn::Div(one, d1);
+        const V l21 = hn::Mul(t21, r1);
+        const V d2 = hn::Sub(hn::Sub(a22, hn::Mul(l20, a02)), hn::Mul(l21, t21));
+        const V y0 = hn::Neg(g.x);
+        const V y1 = hn::Sub(hn::Neg(g.y), hn::Mul(l10, y0));
+        const V y2 = hn::Sub(hn::Sub(hn::Neg(g.z), hn::Mul(l20, y0)), hn::Mul(l21, y1));
+        const V z2 = hn::Div(y2, d2);
+        const V z1 = hn::Sub(hn::Mul(y1, r1), hn::Mul(l21, z2));
+        const V z0 = hn::Sub(hn::Sub(hn::Mul(y0, r0), hn::Mul(l10, z1)), hn::Mul(l20, z2));
+        return {z0, z1, z2};
+    }
+};
+
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE V snap(D d, V p, const SnapGrid& grid, float low, float high) {
+    const V scaled = hn::Add(hn::Mul(p, hn::Set(d, grid.inverse_step)), hn::Set(d, 0.5f));
+    const V snapped = hn::Mul(hn::Floor(scaled), hn::Set(d, grid.step));
+    // note: adding zero turns -0 into 0, so that equal positions have equal bytes.
+    return hn::Add(hn::Max(hn::Set(d, low), hn::Min(hn::Set(d, high), snapped)), hn::Zero(d));
+}
+
+/// f(z) = z'Az + 2 g'z + c around u, the sum of both quadrics.
+HWY_INLINE void placeLanes(const Point* points, const Quadric* quadrics, const SnapGrid& grid,
+                           EdgeBatch& batch, size_t first) {
+    using V = hn::Vec<PlaceTag>;
+    const PlaceTag d;
+    const hn::RebindToSigned<PlaceTag> di;
+    const uint32_t *u = batch.u + first, *v = batch.v + first;
+    const Columns<V> at_u = gather(d, RowOf<Point>{points, u, 0});
+    const Columns<V> at_v = gather(d, RowOf<Point>{points, v, 0});
+    const Columns<V> v0 = gather(d, RowOf<Quadric>{quadrics, v, 0});
+    const Columns<V> v1 = gather(d, RowOf<Quadric>{quadrics, v, 1});
+    const Columns<V> v2 = gather(d, RowOf<Quadric>{quadrics, v, 2});
+    const Columns<V> s0 = gather(d, RowOfBoth{quadrics, u, v, 0});
+    const Columns<V> s1 = gather(d, RowOfBoth{quadrics, u, v, 1});
+    const Columns<V> s2 = gather(d, RowOfBoth{quadrics, u, v, 2});
+
+    const V3<V> edge = at_v.xyz() - at_u.xyz();
+    const V3<V> back = at_u.xyz() - at_v.xyz();
+    const Symmetric<V> of_v{v0.c0, v0.c1, v0.c2, v0.c3, v1.c0, v1.c1};
+    const V3<V> moved = of_v.times(back), b = v2.xyz();
+    const V3<V> g = s2.xyz() + moved;
+    const V c = hn::Add(s1.c2, dot(moved + b + b, back));
+    const Symmetric<V> a{s0.c0, s0.c1, s0.c2, s0.c3, s1.c0, s1.c1};
+
+    const V3<V> optimum = a.solveNegative(d, g);
+    const V half = hn::Set(d, 0.5f);
+    const V3<V> middle{hn::Mul(edge.x, half), hn::Mul(edge.y, half), hn::Mul(edge.z, half)};
+    const V3<V> off = optimum - middle;
+    const auto near = hn::Le(dot(off, off), dot(edge, edge));
+    const V3<V> place = at_u.xyz() + select(near, optimum, middle);
+    const V3<V> snapped{snap(d, place.x, grid, grid.low.x, grid.high.x),
+                        snap(d, place.y, grid, grid.low.y, grid.high.y),
+                        snap(d, place.z, grid, grid.low.z, grid.high.z)};
+
+    const auto rank_mask = hn::Set(di, int32_t(kRankMask));
+    const auto rank_u = hn::And(hn::BitCast(di, at_u.c3), rank_mask);
+    const auto rank_v = hn::And(hn::BitCast(di, at_v.c3), rank_mask);
+    V3<V> to = select(hn::RebindMask(d, hn::Gt(rank_u, rank_v)), at_u.xyz(), snapped);
+    to = select(hn::RebindMask(d, hn::Gt(rank_v, rank_u)), at_v.xyz(), to);
+    // A curve keeps vertices of its own: the end with the lower cost, v where f(edge) < f(0).
+    const auto curve = hn::Set(di, int32_t(kRankCurve));
+    const auto on_curve = hn::And(hn::Eq(rank_u, curve), hn::Eq(rank_v, curve));
+    const auto v_is_better = hn::Lt(dot(a.times(edge) + g + g, edge), hn::Zero(d));
+    to = select(hn::RebindMask(d, on_curve), select(v_is_better, at_v.xyz(), at_u.xyz()), to);
+
+    const V3<V> z = to - at_u.xyz();
+    const V cost = hn::Add(dot(a.times(z) + g + g, z), c);
+    hn::Store(hn::Max(cost, hn::Zero(d)), d, batch.cost + first);
+    hn::Store(to.x, d, batch.x + first);
+    hn::Store(to.y, d, batch.y + first);
+    hn::Store(to.z, d, batch.z + first);
+}
+
+void place(const Point* points, const Quadric* quadrics, const SnapGrid& grid, EdgeBatch& batch) {
+    for (size_t i = 0; i < kBatch; i += hn::MaxLanes(PlaceTag()))
+        placeLanes(points, quadrics, grid, batch, i);
+}
+
+HWY_INLINE uint32_t foldingLanes(const Point* points, const uint32_t* apex, const uint32_t* next,
+                                 const uint32_t* previous, const V3<hn::Vec<FoldTag>>& to) {
+    using V = hn::Vec<FoldTag>;
+    const FoldTag d;
+    const V3<V> from = positionsOf(d, points, apex);
+    const V3<V> n = positionsOf(d, points, next), p = positionsOf(d, points, previous);
+    const V3<V> new_n = n - to, new_p = p - to, opposite = n - p;
+    const V3<V> old_normal = cross(n - from, p - from), new_normal = cross(new_n, new_p);
+    const V new_sq = dot(new_normal, new_normal);
+    const V longest =
+        hn::Max(hn::Max(dot(new_n, new_n), dot(new_p, new_p)), dot(opposite, opposite));
+    const auto shapely = hn::Gt(new_sq, hn::Mul(hn::Set(d, kMinShape), hn::Mul(longest, longest)));
+    const V turn = dot(old_normal, new_normal);
+    // note: squares of squared areas would overflow near the root, hence the quotient.
+    const V turn_sq = hn::Mul(turn, hn::Div(turn, dot(old_normal, old_normal)));
+    const auto straight = hn::And(hn::Gt(turn, hn::Zero(d)),
+                                  hn::Gt(turn_sq, hn::Mul(hn::Set(d, kMinCosineSq), new_sq)));
+    uint8_t bits[8] = {0};
+    hn::StoreMaskBits(d, hn::Not(hn::And(shapely, straight)), bits);
+    return uint32_t(bits[0]) & ((1u << hn::MaxLanes(d)) - 1);
+}
+
+uint32_t foldingTriangles(const Point* points, const uint32_t* apex, const uint32_t* next,
+                          const uint32_t* previous, const Vec3f& to) {
+    const FoldTag d;
+    const V3<hn::Vec<FoldTag>> at{hn::Set(d, to.x), hn::Set(d, to.y), hn::Set(d, to.z)};
+    uint32_t bits = 0;
+    for (size_t i = 0; i < kFoldBatch; i += hn::MaxLanes(d))
+        bits |= foldingLanes(points, apex + i, next + i, previous + i, at) << i;
+    return bits;
+}
+
+}  // namespace pietra::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace pietra {
+
+HWY_EXPORT(place);
+HWY_EXPORT(foldingTriangles);
+
+EdgeKernels chooseEdgeKernels() {
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    return {&HWY_DYNAMIC_DISPATCH(place), &HWY_DYNAMIC_DISPATCH(foldingTriangles)};
+}
+
+}  // namespace pietra
+#endif

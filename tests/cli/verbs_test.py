@@ -1,0 +1,231 @@
+#!/usr/bin/env python3
+"""Verbs that make and show things: synthetic meshes, pictures, extracted meshes as others read them.
+
+usage: verbs_test.py PIETRA [unittest arguments]
+"""
+
+import collections
+import json
+import os
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import command_line_test
+from command_line_test import CommandLineTest, write_torus
+
+WIDTHS = {"float": "f", "double": "d", "uchar": "B"}
+
+
+def read_ply(data):
+    """Names of the vertices' properties, the vertices, and the triangles of a PLY that we wrote."""
+    head, body = data.split(b"end_header\n", 1)
+    counts, names, code, part = {}, [], "<", ""
+    for line in head.decode().split("\n"):
+        words = line.split()
+        if words[:1] == ["element"]:
+            part = words[1]
+            counts[part] = int(words[2])
+        elif words[:1] == ["property"] and part == "vertex":
+            code += WIDTHS[words[1]]
+            names.append(words[2])
+    size = struct.calcsize(code) * counts["vertex"]
+    vertices = list(struct.iter_unpack(code, body[:size]))
+    triangles = [t[1:] for t in struct.iter_unpack("<BIII", body[size:])]
+    assert len(vertices) == counts["vertex"] and len(triangles) == counts["face"]
+    return names, vertices, triangles
+
+
+def edge_uses(triangles):
+    """How many edges are used by how many triangles, without regard to direction."""
+    uses = collections.Counter()
+    for a, b, c in triangles:
+        for edge in ((a, b), (b, c), (c, a)):
+            uses[min(edge), max(edge)] += 1
+    return collections.Counter(uses.values())
+
+
+class VerbTest(CommandLineTest):
+    def report(self, *arguments, code=0):
+        """The JSON on standard output."""
+        run = self.run_pietra(*arguments)
+        self.assertEqual(run.returncode, code, run.stderr)
+        return json.loads(run.stdout)
+
+
+class Synth(VerbTest):
+    def test_every_kind(self):
+        for kind in ("sphere", "statue", "terrain"):
+            made = self.report("synth", kind, "-o", f"{kind}.ply", "--triangles", "3k", "--report", "-")
+            self.assertEqual(made["kind"], kind)
+            self.assertTrue(1000 < made["triangles"] < 9000, made)
+            names, vertices, triangles = read_ply(self.read(f"{kind}.ply"))
+            self.assertEqual((len(vertices), len(triangles)), (made["vertices"], made["triangles"]))
+            closed = set(edge_uses(triangles)) == {2}
+            self.assertEqual(closed, kind != "terrain")
+
+    def test_the_seed_decides(self):
+        for name, seed in (("a", "1"), ("b", "1"), ("c", "2")):
+            self.report("synth", "statue", "-o", f"{name}.ply", "--triangles", "2k", "--seed", seed,
+                        "--report", "-")
+        self.assertEqual(self.read("a.ply"), self.read("b.ply"))
+        self.assertNotEqual(self.read("a.ply"), self.read("c.ply"))
+
+    def test_subdivide(self):
+        write_torus(self.path("torus.ply"), 20, 12)
+        made = self.report("synth", "subdivide", "torus.ply", "-o", "fine.ply", "--levels", "2",
+                           "--displace", "0.2", "--report", "-")
+        self.assertEqual(made["triangles"], 480 * 16)
+        self.assertEqual(set(edge_uses(read_ply(self.read("fine.ply"))[2])), {2})
+        flat = self.report("synth", "subdivide", "torus.ply", "-o", "flat.obj", "--levels", "2",
+                           "--displace", "0", "--report", "-")
+        self.assertEqual(flat["vertices"], made["vertices"])
+
+    def test_refusals(self):
+        end = " (see pietra synth --help)"
+        refuse = self.assertRefused
+        refuse(["synth"], 2, "synth: KIND is missing" + end)
+        refuse(["synth", "cube", "-o", "x.ply"], 2,
+               'synth knows no "cube", but sphere, statue, terrain, earth, subdivide')
+        refuse(["synth", "sphere", "-o", "x.abc"], 2,
+               "x.abc: the name of a mesh ends in .ply, .obj, .stl or .glb")
+        refuse(["synth", "sphere", "-o", "x.ply", "--levels", "2"], 2,
+               "--levels: goes with synth subdivide only")
+        refuse(["synth", "sphere", "-o", "x.ply", "--displace", "0.1"], 2,
+               "--displace: goes with synth subdivide only")
+        refuse(["synth", "sphere", "in.ply", "-o", "x.ply"], 2,
+               "synth sphere takes no input, 'in.ply' was given")
+        refuse(["synth", "subdivide", "-o", "x.ply"], 2, "synth subdivide needs a mesh to subdivide")
+        refuse(["synth", "subdivide", "in.ply", "-o", "x.ply", "--triangles", "5"], 2,
+               "--triangles: synth subdivide is told --levels instead")
+        refuse(["synth", "subdivide", "none.ply", "-o", "x.ply"], 4,
+               "none.ply: cannot open: No such file or directory")
+        self.write("x.ply", "mine")
+        refuse(["synth", "sphere", "-o", "x.ply"], 2, "x.ply: exists; --force overwrites it")
+
+
+class Shown(VerbTest):
+    """A statue, closed, and a terrain, open and with attributes, each as a model."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.shared = tempfile.TemporaryDirectory(prefix="pietra-verbs-")
+        for kind in ("statue", "terrain"):
+            for arguments in (["synth", kind, "-o", f"{kind}.ply", "--triangles", "20k"],
+                              ["build", f"{kind}.ply", "-o", f"{kind}.pietra",
+                               "--leaf-triangles", "500", "--patch-triangles", "300"]):
+                subprocess.run([command_line_test.PIETRA, *arguments, "--quiet"],
+                               cwd=cls.shared.name, check=True)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.shared.cleanup()
+
+    def setUp(self):
+        super().setUp()
+        for name in os.listdir(self.shared.name):
+            os.symlink(os.path.join(self.shared.name, name), self.path(name))
+
+    def extract(self, model, *arguments):
+        """What is written, as the three parts of read_ply()."""
+        self.report("extract", f"{model}.pietra", "-o", "x.ply", "--force", "--report", "-",
+                    *arguments)
+        return read_ply(self.read("x.ply"))
+
+    def test_a_closed_mesh_is_closed_in_every_cut(self):
+        info = self.report("info", "statue.pietra", "--json")
+        full = self.extract("statue", "--full")
+        self.assertEqual(len(full[2]), info["input"]["triangles"])
+        self.assertEqual(len(full[1]), info["input"]["vertices"])
+        for cut in (full, self.extract("statue", "--triangles", "4k"),
+                    self.extract("statue", "--error", str(info["max_error"] / 20))):
+            names, vertices, triangles = cut
+            self.assertEqual(set(edge_uses(triangles)), {2})
+            self.assertEqual(len(set(vertices)), len(vertices))
+            self.assertEqual(len({v for t in triangles for v in t}), len(vertices))
+
+    def test_an_open_mesh_keeps_its_border_and_its_attributes(self):
+        before = read_ply(self.read("terrain.ply"))
+        after = self.extract("terrain", "--full")
+        self.assertEqual(sorted(before[0]), sorted(after[0]))
+        self.assertEqual(edge_uses(before[2]), edge_uses(after[2]))
+        kept = [name for name in before[0] if name not in ("x", "y", "z", "nx", "ny", "nz")]
+        self.assertIn("red", kept)
+        columns = lambda mesh: sorted(tuple(v[mesh[0].index(name)] for name in kept) for v in mesh[1])
+        self.assertEqual(columns(before), columns(after))
+
+    def test_memory_and_threads_change_no_byte(self):
+        self.extract("statue", "--full")
+        first = self.read("x.ply")
+        self.extract("statue", "--full", "--memory", "100M", "--jobs", "1")
+        self.assertEqual(self.read("x.ply"), first)
+
+    def test_below_the_finest_bound_the_finest_is_written_with_a_warning(self):
+        run = self.run_pietra("extract", "statue.pietra", "-o", "x.ply", "--error", "0", "--report", "-")
+        report = json.loads(run.stdout)
+        self.assertEqual(run.returncode, 0)
+        self.assertIn("the finest is written", run.stderr)
+        self.assertEqual(report["triangles"],
+                         self.report("info", "statue.pietra", "--json")["input"]["triangles"])
+        self.assertGreater(report["max_error"], 0)
+
+    def render(self, name, *arguments, models=("statue.pietra",)):
+        return self.report("render", *models, "-o", name, "--size", "200x160", "--report", "-",
+                           *arguments)
+
+    def test_ram_changes_no_pixel(self):
+        self.render("a.png", "--pixels", "0")
+        run = self.run_pietra("render", "statue.pietra", "-o", "b.png", "--size", "200x160", "--ram",
+                              "1k")
+        least = float(run.stderr.split("needs ")[1].split()[0])
+        self.assertIn(" MiB at least", run.stderr)
+        self.render("b.png", "--pixels", "0", "--ram", f"{least + 0.2:.2f}M", "--jobs", "1")
+        self.assertEqual(self.read("a.png"), self.read("b.png"))
+
+    def test_culling_and_light(self):
+        shown = self.render("none.png", "--cull", "none")
+        for word in ("frustum", "cone", "occlusion", "all"):
+            self.assertLessEqual(self.render(f"{word}.png", "--cull", word)["triangles"],
+                                 shown["triangles"])
+            same = self.report("compare", "none.png", f"{word}.png", "--json", "--max-px", "1",
+                               "--max-shade", "8")
+            self.assertTrue(same["ok"])
+        self.assertEqual(self.read("occlusion.png"), self.read("none.png"))
+        self.render("left.png", "--light", "-1,0,0")
+        self.report("compare", "none.png", "left.png", "--json", "--max-shade", "8", code=6)
+
+    def test_every_view_of_the_attributes(self):
+        pictures = set()
+        for show in ("shaded", "normals", "depth", "lod", "patches", "triangles", "error", "colour",
+                     "scalar:height"):
+            self.render(f"{show}.png", "--show", show, "--pixels", "4", models=["terrain.pietra"])
+            pictures.add(self.read(f"{show}.png"))
+        self.assertEqual(len(pictures), 9)
+
+    def test_render_refusals(self):
+        end = " (see pietra render --help)"
+        refuse = self.assertRefused
+        start = ["render", "statue.pietra", "-o", "x.png"]
+        refuse(start + ["--renderer", "gl"], 2,
+               "--renderer gl: the OpenGL renderer is not there yet; use cpu")
+        refuse(start + ["--light", "1,2"], 2, "render: --light: '1,2' is not of the form X,Y,Z" + end)
+        refuse(start + ["--light", "0,0,0"], 2, "render: --light: '0,0,0' is no direction" + end)
+        refuse(start + ["--camera", "c.json", "--view", "top"], 2,
+               "--camera and --view exclude each other: give one")
+
+    def test_compare_finds_what_has_moved(self):
+        for name, x in (("a", 0.0), ("b", 0.0), ("c", 0.05)):
+            self.write("c.json", json.dumps({"eye": [x, -5, 0.5], "target": [x, 0, 0],
+                                             "up": [0, 0, 1], "fovy_deg": 40}))
+            self.render(f"{name}.png", "--camera", "c.json")
+        same = self.report("compare", "a.png", "b.png", "--json", "--max-px", "0", "--max-shade", "0")
+        self.assertEqual(same["largest_px"], 0)
+        moved = self.report("compare", "a.png", "c.png", "--json", "--max-px", "1", code=6)
+        self.assertGreater(moved["largest_px"], 1)
+
+
+if __name__ == "__main__":
+    command_line_test.PIETRA = os.path.abspath(sys.argv.pop(1))
+    unittest.main()

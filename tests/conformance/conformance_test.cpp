@@ -1,0 +1,207 @@
+// What every method promises, for every kind of input. A new method is tested here as soon as it
+// stands in the method table.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "audit/certificate.h"
+#include "audit/cracks.h"
+#include "base/error.h"
+#include "methods/method_table.h"
+#include "multires/cut.h"
+#include "runtime/patch_reader.h"
+#include "store/model_reader.h"
+#include "store/verify.h"
+#include "tests/conformance/meshes.h"
+
+namespace pietra {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Scratch {
+public:
+    Scratch() : path_((fs::temp_directory_path() / "pietra-conformance-XXXXXX").string()) {
+        if (!::mkdtemp(path_.data())) throw std::runtime_error("mkdtemp");
+    }
+    ~Scratch() { fs::remove_all(path_); }
+    std::string file(const std::string& name) const { return path_ + "/" + name; }
+    const std::string& path() const { return path_; }
+
+private:
+    std::string path_;
+};
+
+std::string bytesOf(const std::string& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+const std::vector<ConformanceMesh>& meshes() {
+    static const std::vector<ConformanceMesh> all = {closedMesh(45), borderedMesh(110),
+                                                     nonManifoldMesh(60), dustMesh(6000)};
+    return all;
+}
+
+class Conformance : public testing::TestWithParam<std::tuple<size_t, size_t>> {
+protected:
+    const Method& method() const { return methods()[std::get<0>(GetParam())]; }
+    const ConformanceMesh& mesh() const { return meshes()[std::get<1>(GetParam())]; }
+
+    BuildReport build(const std::string& name, int jobs = 2, size_t memory = size_t(1) << 30) {
+        BuildSettings settings;
+        settings.output = scratch_.file(name);
+        settings.force = true;
+        settings.memory_bytes = memory;
+        settings.jobs = jobs;
+        settings.temp_dir = scratch_.path();
+        settings.leaf_triangles = 700;
+        settings.patch_triangles = 500;
+        settings.input_name = mesh().name;
+        Progress progress;
+        return method().build(*mesh().source(), settings, progress);
+    }
+
+    PatchStream streamOf(const ModelReader& model) const {
+        return [&model](std::span<const NodeIndex> nodes, const PatchVisitor& visit) {
+            visitPatches(model, nodes, visit);
+        };
+    }
+
+    Scratch scratch_;
+    Budget budget_{size_t(512) << 20};
+};
+
+std::string parameterName(const testing::TestParamInfo<std::tuple<size_t, size_t>>& info) {
+    std::string name = std::string(methods()[std::get<0>(info.param)].name) + "_" +
+                       meshes()[std::get<1>(info.param)].name;
+    std::replace(name.begin(), name.end(), '-', '_');
+    return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(AllMethods, Conformance,
+                         testing::Combine(testing::Range(size_t(0), methods().size()),
+                                          testing::Range(size_t(0), size_t(4))),
+                         parameterName);
+
+TEST_P(Conformance, errorsAreMonotoneAndBoundsNested) {
+    build("model");
+    const ModelReader model(scratch_.file("model"));
+    Progress progress;
+    const VerifyReport report = verifyModel(model, progress);
+    EXPECT_TRUE(report.ok()) << (report.faults.empty() ? "" : report.faults[0]);
+    EXPECT_EQ(report.pages.checked, model.pageCount());
+    EXPECT_GT(model.info().levels, 3u);
+    EXPECT_LE(rootCut(model.nodes()).triangles, 1500u);
+}
+
+TEST_P(Conformance, anyValidCutIsCrackFree) {
+    build("model");
+    const ModelReader model(scratch_.file("model"));
+    std::set<uint64_t> sizes;
+    for (uint64_t seed = 0; seed < 40; ++seed) {
+        const Cut cut = randomCut(model.nodes(), seed);
+        sizes.insert(cut.triangles);
+        const CrackReport report = countCracks(streamOf(model), cut.nodes, budget_,
+                                               size_t(16) << 20, scratch_.path());
+        EXPECT_TRUE(report.ok()) << "cut " << seed << ": " << report.cracked_edges << " cracked, "
+                                 << report.overlapping_edges << " overlapping, "
+                                 << report.miscounted_edges << " miscounted, "
+                                 << report.disagreeing_edges << " disagreeing";
+    }
+    EXPECT_GT(sizes.size(), 10u);
+}
+
+TEST_P(Conformance, finestCutIsTheInput) {
+    const BuildReport report = build("model");
+    const ModelReader model(scratch_.file("model"));
+    const Lattice& lattice = model.info().lattice;
+    using Key = std::array<uint64_t, 3>;
+    const auto sorted = [](Key key) {
+        std::sort(key.begin(), key.end());
+        return key;
+    };
+    std::set<Key> expected, found;
+    for (const auto& t : mesh().triangles) {
+        Key key;
+        for (size_t k = 0; k < 3; ++k) {
+            const Vec3d q = lattice.toLattice(mesh().vertices.position[t[k]]);
+            key[k] = latticeKey(snapToShift(Vec3i(glm::floor(q + 0.5)), lattice.shift));
+        }
+        key = sorted(key);
+        if (key[0] != key[1] && key[1] != key[2]) expected.insert(key);
+    }
+    std::mutex mutex;
+    const Cut finest = finestCut(model.nodes());
+    visitPatches(model, finest.nodes, [&](NodeIndex, const Mesh& patch) {
+        const std::lock_guard lock(mutex);
+        for (const Triangle& t : patch.triangle) {
+            Key key;
+            for (size_t k = 0; k < 3; ++k) key[k] = latticeKey(patch.position[t[k]]);
+            EXPECT_TRUE(found.insert(sorted(key)).second);
+        }
+    });
+    EXPECT_EQ(found, expected);
+    EXPECT_EQ(report.input_triangles, mesh().triangles.size());
+    EXPECT_EQ(report.input_triangles - report.dropped_degenerate - report.dropped_duplicate,
+              expected.size());
+}
+
+TEST_P(Conformance, bytesDoNotDependOnThreadsOrMemory) {
+    build("one", 1);
+    const std::string one = bytesOf(scratch_.file("one"));
+    EXPECT_FALSE(one.empty());
+    for (const int jobs : {2, 7}) {
+        build("more", jobs);
+        EXPECT_TRUE(bytesOf(scratch_.file("more")) == one) << jobs << " threads";
+    }
+    build("little", 2, size_t(96) << 20);
+    EXPECT_TRUE(bytesOf(scratch_.file("little")) == one);
+}
+
+TEST_P(Conformance, statedErrorsHoldAgainstTheFinestCut) {
+    build("model");
+    const ModelReader model(scratch_.file("model"));
+    std::vector<Cut> cuts = {rootCut(model.nodes())};
+    for (uint64_t seed = 0; seed < 6; ++seed) cuts.push_back(randomCut(model.nodes(), seed));
+    const PatchStream stream = streamOf(model);
+    CertificateOptions options;
+    options.samples = 300'000;
+    const auto reports = auditCertificate(model.nodes(), cuts, stream,
+                                          truthOfFinestCut(model.nodes(), stream), options, budget_);
+    for (const CertificateReport& report : reports) {
+        EXPECT_EQ(report.violations(), 0u) << report.worstRatio();
+        EXPECT_GT(report.samples(), 1000u);
+    }
+    EXPECT_GT(reports[0].worstRatio(), 0.15);  // a bound, but no idle one
+}
+
+TEST_P(Conformance, damageIsFound) {
+    build("model");
+    const std::string whole = bytesOf(scratch_.file("model"));
+    const auto rejected = [&](const std::string& bytes) {
+        std::ofstream(scratch_.file("bad"), std::ios::binary) << bytes;
+        try {
+            const ModelReader model(scratch_.file("bad"));
+            Progress progress;
+            return !verifyModel(model, progress).ok();
+        } catch (const InputError&) {
+            return true;
+        }
+    };
+    EXPECT_FALSE(rejected(whole));
+    for (size_t part = 0; part < 20; ++part) {
+        EXPECT_TRUE(rejected(whole.substr(0, whole.size() * part / 20))) << part;
+        std::string flipped = whole;
+        const size_t at = mixBits(part) % whole.size();
+        flipped[at] = char(flipped[at] ^ (1 << part % 8));
+        EXPECT_TRUE(rejected(flipped)) << "byte " << at;
+    }
+}
+
+}  // namespace
+}  // namespace pietra
