@@ -19,8 +19,8 @@
 namespace pietra {
 namespace {
 
-constexpr int kPasses = 7;
-constexpr uint64_t kMostTriangles = 1500000;  // of a band; more only take time
+constexpr int kPasses = 5;
+constexpr uint64_t kMostTriangles = 200000;  // of a band; more only take time
 
 double threadSeconds() {
     timespec now{};

@@ -3,58 +3,60 @@
 namespace pietra {
 
 bool FanMesh::build(const Mesh& mesh) {
-    for (const Triangle& t : mesh.triangle)
-        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return false;
     first_.assign(mesh.vertexCount() + 1, 0);
-    for (const Triangle& t : mesh.triangle)
+    for (const Triangle& t : mesh.triangle) {
+        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return false;
         for (const uint32_t v : t) ++first_[v];
-    uint32_t sum = 0;
-    for (uint32_t& entry : first_) {
-        if (entry == 0 && &entry != &first_.back()) return false;
-        sum += entry;
-        entry = sum;  // the end of each run; filling moves it to the begin
     }
+    uint32_t sum = 0;
+    for (size_t v = 0; v < mesh.vertexCount(); ++v) {
+        if (first_[v] == 0) return false;
+        sum += first_[v];
+        first_[v] = sum;  // the end of the run; filling it moves this to its begin
+    }
+    first_.back() = sum;
+    leaving_.resize(sum);
+    for (auto t = uint32_t(mesh.triangleCount()); t-- > 0;)
+        for (uint32_t k = 3; k-- > 0;) leaving_[--first_[mesh.triangle[t][k]]] = 4 * t + k;
     pairHalfEdges(mesh);
     splitIntoFans(mesh);
     return true;
 }
 
 void FanMesh::pairHalfEdges(const Mesh& mesh) {
-    const auto m = uint32_t(mesh.triangleCount());
-    leaving_.resize(3 * size_t(m));
-    for (uint32_t t = m; t-- > 0;)
-        for (uint32_t k = 3; k-- > 0;) {
-            const uint32_t from = mesh.triangle[t][k], to = mesh.triangle[t][k == 2 ? 0 : k + 1];
-            leaving_[--first_[from]] = {to, 3 * t + k};
-        }
-    opposite.assign(3 * size_t(m), kNone);
-    const auto only = [&](uint32_t from, uint32_t to) {  // the half-edge, if there is just one
-        uint32_t found = kNone;
-        for (uint32_t i = first_[from]; i < first_[from + 1]; ++i) {
-            if (leaving_[i].target != to) continue;
-            if (found != kNone) return kNone;
-            found = leaving_[i].half_edge;
-        }
-        return found;
-    };
-    for (uint32_t v = 0; v < mesh.vertexCount(); ++v)
+    opposite.assign(4 * mesh.triangleCount(), kNone);
+    slots_.assign(mesh.vertexCount(), {kNone, kNone, kNone});
+    const auto startOf = [&](uint32_t h) { return mesh.triangle[h >> 2][h & 3]; };
+    // Each edge from its lower end: first what leaves this, then what arrives.
+    for (uint32_t v = 0; v < mesh.vertexCount(); ++v) {
         for (uint32_t i = first_[v]; i < first_[v + 1]; ++i) {
-            const uint32_t w = leaving_[i].target;
+            const uint32_t w = startOf(nextHalfEdge(leaving_[i]));
             if (w < v) continue;
-            const uint32_t back = only(w, v);
-            if (back == kNone || only(v, w) == kNone) continue;
-            opposite[leaving_[i].half_edge] = back;
-            opposite[back] = leaving_[i].half_edge;
+            Slot& slot = slots_[w];
+            slot = {v, slot.vertex == v ? kNone : leaving_[i], kNone};
         }
+        for (uint32_t i = first_[v]; i < first_[v + 1]; ++i) {
+            const uint32_t h = previousHalfEdge(leaving_[i]);
+            const uint32_t w = startOf(h);
+            Slot& slot = slots_[w];
+            if (w < v || slot.vertex != v || slot.leaving == kNone) continue;
+            const bool first = slot.arriving == kNone;
+            opposite[first ? h : slot.arriving] = first ? slot.leaving : kNone;
+            opposite[slot.leaving] = first ? h : kNone;
+            if (first)
+                slot.arriving = h;
+            else
+                slot.leaving = kNone;
+        }
+    }
 }
 
 void FanMesh::splitIntoFans(const Mesh& mesh) {
-    const size_t half_edges = opposite.size();
-    corner.assign(half_edges, kNone);
+    corner.assign(opposite.size(), kNone);
     origin.clear();
     valence.clear();
     border.clear();
-    for (uint32_t h = 0; h < half_edges; ++h) {
+    for (const uint32_t h : leaving_) {
         if (corner[h] != kNone) continue;
         const auto fan = uint32_t(origin.size());
         uint32_t count = 0, leaves = kNone;
@@ -65,15 +67,12 @@ void FanMesh::splitIntoFans(const Mesh& mesh) {
             ++count;
             at = opposite[previousHalfEdge(at)];
         } while (at != kNone && at != h);
-        if (at == kNone) {
-            leaves = h;
-            while (opposite[leaves] != kNone) {
+        if (at == kNone)
+            for (leaves = h; opposite[leaves] != kNone; ++count) {
                 leaves = nextHalfEdge(opposite[leaves]);
                 corner[leaves] = fan;
-                ++count;
             }
-        }
-        origin.push_back(mesh.triangle[h / 3][h % 3]);
+        origin.push_back(mesh.triangle[h >> 2][h & 3]);
         valence.push_back(count);
         border.push_back(leaves);
     }

@@ -4,23 +4,22 @@
 // its fans: runs of triangles around it that are joined by paired edges. A fan vertex is interior
 // (its fan closes) or lies on exactly one border loop. Internal to src/store.
 //
-// Half-edge 3t+k of triangle t starts at its corner k. Linear time, deterministic.
+// Half-edge 4t+k of triangle t starts at its corner k, k < 3; arrays over half-edges have a hole at
+// every fourth place. Linear time, deterministic.
 
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "geometry/mesh.h"
+#include "store/front_walk.h"
 
 namespace pietra {
 
-inline constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
-
 inline uint32_t nextHalfEdge(uint32_t h) {
-    return h % 3 == 2 ? h - 2 : h + 1;
+    return (h & 3) == 2 ? h - 2 : h + 1;
 }
 inline uint32_t previousHalfEdge(uint32_t h) {
-    return h % 3 == 0 ? h + 2 : h - 1;
+    return (h & 3) == 0 ? h + 2 : h - 1;
 }
 
 struct FanMesh {
@@ -34,15 +33,18 @@ struct FanMesh {
     [[nodiscard]] bool build(const Mesh& mesh);
 
 private:
+    /// What is known of the half-edges between a vertex in hand and some other one.
+    struct Slot {
+        uint32_t vertex;    // the one in hand, when this was written
+        uint32_t leaving;   // half-edge from it to the other; kNone if there are several
+        uint32_t arriving;  // and back; kNone as long as there is none
+    };
     void pairHalfEdges(const Mesh& mesh);
     void splitIntoFans(const Mesh& mesh);
 
-    std::vector<uint32_t> first_;  // of the half-edges that leave a vertex, in leaving_
-    struct Leaving {
-        uint32_t target;
-        uint32_t half_edge;
-    };
-    std::vector<Leaving> leaving_;
+    std::vector<uint32_t> first_;    // of a vertex's run in leaving_
+    std::vector<uint32_t> leaving_;  // half-edges, by the vertex they leave
+    std::vector<Slot> slots_;
 };
 
 }  // namespace pietra

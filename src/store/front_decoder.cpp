@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 
 #include "geometry/lattice.h"
@@ -11,15 +12,13 @@ namespace pietra {
 
 namespace {
 
-constexpr uint32_t kPositionMask = (1u << kLatticeBits) - 1;
-
-/// Hands out the numbers of a sequence; zeros, and a note, once there are none left.
+/// Hands out the numbers of a sequence; zeros, once there are none left, and then it is not
+/// spent().
 class Cursor {
 public:
     void start(std::span<const uint32_t> numbers) {
         at_ = numbers.data();
         end_ = at_ + numbers.size();
-        missing_ = false;
     }
     uint32_t next() {
         if (at_ == end_) [[unlikely]] {
@@ -28,9 +27,15 @@ public:
         }
         return *at_++;
     }
+    /// The next `count` numbers; null if there are not so many.
+    const uint32_t* take(size_t count) {
+        if (size_t(end_ - at_) < count) return nullptr;
+        const uint32_t* taken = at_;
+        at_ += count;
+        return taken;
+    }
     /// All were handed out, and no more were asked for.
     bool spent() const { return at_ == end_ && !missing_; }
-    bool missing() const { return missing_; }
 
 private:
     const uint32_t* at_ = nullptr;
@@ -38,95 +43,137 @@ private:
     bool missing_ = false;
 };
 
+/// restoreNormal of every code, at [code + top].
+std::span<const int16_t> restoredNormals(int bits) {
+    static const auto tables = [] {
+        std::array<std::vector<int16_t>, kMaxNormalBits + 1> all;
+        for (int b = kMinNormalBits; b <= kMaxNormalBits; ++b) {
+            const int32_t top = (1 << (b - 1)) - 1;
+            for (int32_t code = -top; code <= top; ++code)
+                all[b].push_back(int16_t(restoreNormal(code, b)));
+        }
+        return all;
+    }();
+    return tables[bits];
+}
+
 /// Rebuilds patch after patch of a page. The `Side` of FrontWalk.
 class FrontDecoder {
 public:
     FrontDecoder(const PageHeader& header, int coarse_shift,
-                 std::span<const std::vector<uint32_t>> sequences)
-        : header_(header), m_(coarse_shift), in_(sequences.size()) {
+                 std::span<const std::vector<uint32_t>> sequences, std::span<Mesh> meshes,
+                 FrontPatch& patch)
+        : header_(header),
+          meshes_(meshes),
+          coder_(coarse_shift),
+          top_(float(kLatticeMax >> header.shift)),
+          in_(sequences.size()),
+          has_classes_(!sequences[kEdgeClasses].empty()),
+          patch_(patch) {
         for (size_t i = 0; i < sequences.size(); ++i) in_[i].start(sequences[i]);
     }
 
-    [[nodiscard]] bool decode(const PatchHeader& patch, Mesh& mesh);
+    /// Patches in their order.
+    [[nodiscard]] bool decode(uint32_t index);
+    /// Every number of every sequence has been used.
     bool spent() const {
         return std::ranges::all_of(in_, [](const Cursor& cursor) { return cursor.spent(); });
     }
 
     // What FrontWalk asks.
     bool triangle(uint32_t first, uint32_t b, uint32_t c) {
-        if (patch_.triangle.size() == triangles_) return false;
-        patch_.triangle.push_back({patch_.items[first].vertex, b, c});
+        if (patch_.triangles == patch_.triangle.size()) return false;
+        patch_.triangle[patch_.triangles++] = {patch_.items[first].vertex, b, c};
         return true;
     }
     uint32_t symbol(uint32_t) { return in_[kSymbols].next(); }
-    bool vertex(uint32_t pivot, uint32_t next, uint32_t prev, uint32_t valence, uint32_t& id);
-    bool split(uint32_t pivot, uint32_t next, uint32_t& target, uint32_t& left);
+    bool vertex(uint32_t pivot, uint32_t& id, Lanes& at);
+    bool split(uint32_t pivot, uint32_t& target, uint32_t& left);
     bool seed();
     void closed(uint32_t, uint32_t) {}
     void added(uint32_t, uint32_t) {}
-    void joined(uint32_t, uint32_t) {}
 
 private:
-    bool readCopies(uint32_t count, uint32_t vertices);
+    using Copy = std::array<uint32_t, 2>;  // number, number of its original
+
+    bool readCopies(uint32_t count);
     bool startLoops(uint32_t count);
-    bool addBorderVertex(uint32_t parent);
-    bool isCopy() {
-        return next_copy_ < copies_.size() && copies_[next_copy_][0] == patch_.position.size();
+    bool addBorderVertex(uint32_t parent, bool may_share);
+    bool readShared(uint32_t& shared);
+    bool isCopy() const {
+        return next_copy_ < copies_.size() && copies_[next_copy_][0] == patch_.vertices;
     }
-    Vec3i readInterior(const Prediction& prediction);
-    bool storeMesh(Mesh& mesh);
-    void readAttributes(Mesh& mesh);
+    bool isInside(Lanes at) const {
+        const LaneMask inside = (at >= 0.0f) & (at <= top_);
+        return (inside[0] & inside[1] & inside[2]) != 0;
+    }
+    /// What border vertex v is a repetition of, or null.
+    const SharedVertex* sharedAt(uint32_t v) const {
+        return v < patch_.border_vertices && patch_.shared[v] != kNone ? &shared_[patch_.shared[v]]
+                                                                       : nullptr;
+    }
+    void storePositions(Mesh& mesh) const;
+    bool readEdgeClasses(Mesh& mesh);
+    bool readNormals(Mesh& mesh);
+    void readColours(Mesh& mesh);
+    void readScalars(Mesh& mesh);
     void dropCopies(Mesh& mesh);
 
     const PageHeader& header_;
-    const int m_;
+    const std::span<Mesh> meshes_;
+    const ResidualCoder coder_;
+    const float top_;  // largest coordinate, in units of 2^shift
     std::vector<Cursor> in_;
-    FrontPatch patch_;
-    size_t triangles_ = 0;
-    size_t vertices_ = 0;
-    std::vector<std::array<uint32_t, 2>> copies_;  // number, number of its original; ascending
+    const bool has_classes_;
+    FrontPatch& patch_;
+    std::vector<Copy> copies_;  // ascending
     size_t next_copy_ = 0;
     Vec3i last_border_{0, 0, 0};
-    uint32_t outside_ = 0;  // not 0: some position was out of range
-    std::vector<std::array<int32_t, 2>> predicted_;
+    LaneMask inside_{};                 // no interior position so far has been out of range
+    std::vector<SharedVertex> shared_;  // border vertices of the patches before
+    uint32_t expected_ = kNone;         // place of the one wanted next
+    std::vector<uint32_t> final_vertex_;
+    NormalPredictor normals_;
 };
 
-bool FrontDecoder::decode(const PatchHeader& patch, Mesh& mesh) {
+bool FrontDecoder::decode(uint32_t index) {
+    const PatchHeader& patch = header_.patches[index];
+    Mesh& mesh = meshes_[index];
     const uint32_t loops = in_[kPatchCounts].next();
     const uint32_t components = in_[kPatchCounts].next();
     const uint32_t copies = in_[kPatchCounts].next();
     // A copy has triangles of its own, a corner each at least.
     if (copies > 3 * uint64_t(patch.triangles)) return false;
-    triangles_ = patch.triangles;
-    vertices_ = size_t(patch.vertices) + copies;
-    patch_.items.clear();
-    patch_.position.clear();
-    patch_.triangle.clear();
-    patch_.parents.clear();
-    patch_.items.reserve(vertices_ + vertices_ / 8);
-    patch_.position.reserve(vertices_);
-    patch_.triangle.reserve(triangles_);
-    patch_.parents.reserve(vertices_);
+    std::swap(patch_.triangle, mesh.triangle);
+    patch_.reset(size_t(patch.vertices) + copies, patch.triangles);
     last_border_ = patch.corner;
-    outside_ = 0;
-    if (!readCopies(copies, uint32_t(vertices_)) || !startLoops(loops)) return false;
-    patch_.border_vertices = uint32_t(patch_.position.size());
+    expected_ = kNone;
+    inside_ = LaneMask{-1, -1, -1, -1};
+    if (!readCopies(copies) || !startLoops(loops)) return false;
     FrontWalk<FrontDecoder> walk(*this, patch_.items);
-    if (!walk.run(components) || patch_.triangle.size() != triangles_ ||
-        patch_.position.size() != vertices_ || outside_ != 0)
+    if (!walk.run(components) || (inside_[0] & inside_[1] & inside_[2]) == 0 ||
+        patch_.triangles != patch_.triangle.size() || patch_.vertices != patch_.position.size())
         return false;
-    patch_.vertices = uint32_t(vertices_);
-    return storeMesh(mesh);
+    storePositions(mesh);
+    if (!readEdgeClasses(mesh) || !readNormals(mesh)) return false;
+    readColours(mesh);
+    readScalars(mesh);
+    std::swap(patch_.triangle, mesh.triangle);
+    final_vertex_.clear();
+    if (!copies_.empty()) dropCopies(mesh);
+    appendShared(patch_, index, final_vertex_, shared_);
+    return true;
 }
 
-bool FrontDecoder::readCopies(uint32_t count, uint32_t vertices) {
+bool FrontDecoder::readCopies(uint32_t count) {
     copies_.clear();
     next_copy_ = 0;
     uint32_t before = 0;
     for (uint32_t i = 0; i < count; ++i) {
         const uint64_t copy = uint64_t(before) + in_[kCopies].next();
         const uint32_t back = in_[kCopyOrigins].next();
-        if (copy >= vertices || (i > 0 && copy == before) || back == 0 || back > copy) return false;
+        if (copy >= patch_.position.size() || (i > 0 && copy == before) || back == 0 || back > copy)
+            return false;
         before = uint32_t(copy);
         copies_.push_back({before, before - back});
     }
@@ -136,160 +183,203 @@ bool FrontDecoder::readCopies(uint32_t count, uint32_t vertices) {
 bool FrontDecoder::startLoops(uint32_t count) {
     for (uint32_t loop = 0; loop < count; ++loop) {
         const uint32_t length = in_[kLoopLengths].next();
-        const auto first = uint32_t(patch_.items.size());
-        if (length == 0 || length > vertices_ - patch_.position.size()) return false;
-        for (uint32_t i = 0; i < length; ++i) {
-            const uint32_t item = first + i;
+        const uint32_t first = patch_.items.size();
+        if (length == 0 || length > patch_.position.size() - patch_.vertices) return false;
+        patch_.loop_begin.push_back(first);
+        for (uint32_t item = first; item < first + length; ++item) {
             const uint32_t valence = in_[kBorderValences].next();
-            if (valence == 0 || !addBorderVertex(i == 0 ? kNone : item - 1)) return false;
-            patch_.items.push_back({item, item - 1, item + 1, valence, kNone});
+            if (valence == 0 || !addBorderVertex(item == first ? kNone : item - 1, true))
+                return false;
+            patch_.items.push({patch_.position[item], Lanes{}, item, kNone, kNone, valence});
         }
-        patch_.items[first].prev = first + length - 1;
-        patch_.items.back().next = first;
+        patch_.closeLoop(first);
     }
+    patch_.border_vertices = patch_.vertices;
     return true;
 }
 
-bool FrontDecoder::addBorderVertex(uint32_t parent) {
-    const auto id = uint32_t(patch_.position.size());
-    if (id == vertices_) return false;
-    if (parent == kNone) parent = id;
-    patch_.parents.push_back({parent, parent});
-    if (isCopy()) {
-        last_border_ = patch_.position[copies_[next_copy_++][1]];
+bool FrontDecoder::readShared(uint32_t& shared) {
+    const uint32_t code = in_[kShared].next();
+    if (code == kSharedNot) return true;
+    if (code == kSharedAsExpected) {
+        shared = expected_;
     } else {
-        const uint32_t top = uint32_t(kLatticeMax) >> header_.shift;
-        for (int a = 0; a < 3; ++a) {
-            const uint32_t x = uint32_t(last_border_[a]) + unzigzag(in_[kBorderX + a].next());
-            outside_ |= uint32_t(x > top);
-            last_border_[a] = int32_t(x & kPositionMask);
-        }
+        if (code - kSharedByDistance >= shared_.size()) return false;
+        shared = uint32_t(shared_.size()) - 1 - (code - kSharedByDistance);
     }
-    patch_.position.push_back(last_border_);
+    if (shared == kNone) return false;
+    expected_ = shared_[shared].before;
     return true;
 }
 
-Vec3i FrontDecoder::readInterior(const Prediction& prediction) {
-    const int w = prediction.axis;
-    const int u = w == 2 ? 0 : w + 1, v = u == 2 ? 0 : u + 1;
-    const uint32_t top = uint32_t(kLatticeMax) >> header_.shift;
-    Vec3i p;
-    const auto read = [&](int axis, int sequence, int32_t predicted) {
-        const uint32_t x =
-            (uint32_t(toCoarse(predicted, m_)) + unzigzag(in_[kInteriorU + sequence].next())) << m_;
-        outside_ |= uint32_t(x > top);
-        p[axis] = int32_t(x & kPositionMask);
-    };
-    read(u, 0, prediction.point[u]);
-    read(v, 1, prediction.point[v]);
-    const double lift = prediction.slope[u] * double(p[u] - prediction.point[u]) +
-                        prediction.slope[v] * double(p[v] - prediction.point[v]);
-    read(w, 2, prediction.point[w] + int32_t(std::floor(lift + 0.5)));
-    return p;
-}
-
-bool FrontDecoder::vertex(uint32_t pivot, uint32_t next, uint32_t, uint32_t, uint32_t& id) {
-    id = uint32_t(patch_.position.size());
-    if (id == vertices_) return false;
+bool FrontDecoder::addBorderVertex(uint32_t parent, bool may_share) {
+    if (patch_.vertices == patch_.position.size()) return false;
     const bool copy = isCopy();
-    const Vec3i p = copy ? patch_.position[copies_[next_copy_++][1]]
-                         : readInterior(predictVertex(patch_.items, patch_.position, pivot));
-    patch_.parents.push_back({patch_.items[pivot].vertex, patch_.items[next].vertex});
-    patch_.position.push_back(p);
+    uint32_t shared = kNone;
+    if (!copy && may_share && !readShared(shared)) return false;
+    if (may_share) patch_.shared.push_back(shared);
+    Lanes at;
+    if (copy || shared != kNone) {
+        at = copy ? patch_.position[copies_[next_copy_++][1]] : shared_[shared].at;
+        last_border_ = toVec3i(at);
+    } else {
+        for (int a = 0; a < 3; ++a)
+            last_border_[a] =
+                int32_t(uint32_t(last_border_[a]) + unzigzag(in_[kBorderX + a].next()));
+        at = toLanes(last_border_);
+        if (!isInside(at)) return false;
+    }
+    if (parent == kNone) parent = patch_.vertices;
+    patch_.addVertex(at, parent, parent);
     return true;
 }
 
-bool FrontDecoder::split(uint32_t pivot, uint32_t next, uint32_t& target, uint32_t& left) {
+inline bool FrontDecoder::vertex(uint32_t pivot, uint32_t& id, Lanes& at) {
+    if (patch_.vertices == patch_.position.size()) return false;
+    if (isCopy()) [[unlikely]] {
+        at = patch_.position[copies_[next_copy_++][1]];
+    } else {
+        const uint32_t u = in_[kInteriorU].next();
+        const uint32_t v = in_[kInteriorU + 1].next();
+        const uint32_t w = in_[kInteriorU + 2].next();
+        at = coder_.decode(Prediction(patch_.items, pivot), u, v, w);
+        inside_ &= (at >= 0.0f) & (at <= top_);
+    }
+    const FrontItem& v = patch_.items[pivot];
+    id = patch_.addVertex(at, v.vertex, patch_.items[v.next].vertex);
+    return true;
+}
+
+bool FrontDecoder::split(uint32_t pivot, uint32_t& target, uint32_t& left) {
     const uint32_t code = in_[kSplitTargets].next();
     left = in_[kSplitParts].next() + 1;
+    const FrontItems& items = patch_.items;
     if (code >= kSplitSteps) {
         target = code - kSplitSteps;
-        return true;
+    } else if (code % 2 == 0) {
+        target = items[items[pivot].next].next;
+        for (uint32_t step = code / 2; step > 0; --step) target = items[target].next;
+    } else {
+        target = items[pivot].prev;
+        for (uint32_t step = code / 2; step > 0; --step) target = items[target].prev;
     }
-    const bool forward = code % 2 == 0;
-    target = forward ? patch_.items[next].next : patch_.items[pivot].prev;
-    for (uint32_t step = code / 2; step > 0; --step)
-        target = forward ? patch_.items[target].next : patch_.items[target].prev;
     return true;
 }
 
 bool FrontDecoder::seed() {
-    const auto first = uint32_t(patch_.items.size());
+    const uint32_t first = patch_.items.size();
     for (uint32_t k = 0; k < 2; ++k) {
-        const auto id = uint32_t(patch_.position.size());
+        const uint32_t id = patch_.vertices;
         const uint32_t valence = in_[kBorderValences].next();
-        if (valence < 2 || !addBorderVertex(k == 0 ? kNone : id - 1)) return false;
-        patch_.items.push_back({id, first + 1 - k, first + 1 - k, valence, kNone});
+        if (valence < 2 || !addBorderVertex(k == 0 ? kNone : id - 1, false)) return false;
+        patch_.items.push({patch_.position[id], Lanes{}, id, kNone, kNone, valence});
     }
+    patch_.closeLoop(first);
     return true;
 }
 
-bool FrontDecoder::storeMesh(Mesh& mesh) {
-    mesh.position.resize(vertices_);
-    for (size_t v = 0; v < vertices_; ++v) mesh.position[v] = patch_.position[v] << header_.shift;
-    mesh.triangle = patch_.triangle;
-    mesh.edge_class.resize(triangles_);
-    uint32_t bad = 0;
-    for (uint8_t& classes : mesh.edge_class) {
-        const uint32_t value = in_[kEdgeClasses].next();
-        bad |= value >> 6;
-        classes = uint8_t(value);
+void FrontDecoder::storePositions(Mesh& mesh) const {
+    const size_t n = patch_.position.size();
+    mesh.position.resize(n);
+    const auto unit = float(1 << header_.shift);
+    for (size_t v = 0; v < n; ++v) {
+        const Lanes at = patch_.position[v] * unit;
+        mesh.position[v] = {int32_t(at[0]), int32_t(at[1]), int32_t(at[2])};
     }
-    readAttributes(mesh);
-    if (!copies_.empty()) dropCopies(mesh);
+}
+
+bool FrontDecoder::readEdgeClasses(Mesh& mesh) {
+    const size_t n = patch_.triangle.size();
+    mesh.edge_class.assign(n, 0);
+    if (!has_classes_) return true;
+    const uint32_t* classes = in_[kEdgeClasses].take(n);
+    if (classes == nullptr) return false;
+    uint32_t any = 0;
+    for (size_t i = 0; i < n; ++i) {
+        any |= classes[i];
+        mesh.edge_class[i] = uint8_t(classes[i]);
+    }
+    return any >> 6 == 0;
+}
+
+bool FrontDecoder::readNormals(Mesh& mesh) {
+    const size_t n = patch_.position.size();
+    mesh.normal.resize(n);
+    normals_.predict(patch_.position, patch_.triangle, header_.normal_bits);
+    const std::span<const int32_t> x = normals_.x(), y = normals_.y();
+    const std::span<const int16_t> restored = restoredNormals(header_.normal_bits);
+    const auto top = uint32_t(restored.size() / 2);
+    uint32_t bad = 0;
+    const auto restore = [&](uint32_t v, uint32_t code_x, uint32_t code_y) {
+        const uint32_t index_x = uint32_t(x[v]) + unzigzag(code_x) + top;
+        const uint32_t index_y = uint32_t(y[v]) + unzigzag(code_y) + top;
+        bad |= uint32_t(index_x > 2 * top) | uint32_t(index_y > 2 * top);
+        return OctNormal{restored[std::min(index_x, 2 * top)],
+                         restored[std::min(index_y, 2 * top)]};
+    };
+    const uint32_t border = patch_.border_vertices;
+    for (uint32_t v = 0; v < border; ++v) {
+        const SharedVertex* shared = sharedAt(v);
+        if (shared != nullptr) {
+            mesh.normal[v] = meshes_[shared->patch].normal[shared->vertex];
+        } else {
+            const uint32_t code_x = in_[kBorderNormalX].next();
+            mesh.normal[v] = restore(v, code_x, in_[kBorderNormalY].next());
+        }
+    }
+    const uint32_t *code_x = in_[kNormalX].take(n - border),
+                   *code_y = in_[kNormalY].take(n - border);
+    if (code_x == nullptr || code_y == nullptr) return false;
+    for (uint32_t v = border; v < n; ++v)
+        mesh.normal[v] = restore(v, code_x[v - border], code_y[v - border]);
     return bad == 0;
 }
 
-void FrontDecoder::readAttributes(Mesh& mesh) {
-    const auto scalars = size_t(header_.scalar_count);
-    mesh.normal.resize(vertices_);
-    mesh.colour.resize(header_.colours ? vertices_ : 0);
-    mesh.scalar.resize(vertices_ * scalars);
-    predictNormals(patch_, header_.normal_bits, predicted_);
-    const int32_t top = (1 << (header_.normal_bits - 1)) - 1;
-    next_copy_ = 0;
-    for (uint32_t id = 0; id < vertices_; ++id) {
-        if (next_copy_ < copies_.size() && copies_[next_copy_][0] == id) {
-            const uint32_t original = copies_[next_copy_++][1];
-            mesh.normal[id] = mesh.normal[original];
-            if (header_.colours) mesh.colour[id] = mesh.colour[original];
-            for (size_t s = 0; s < scalars; ++s)
-                mesh.scalar[id * scalars + s] = mesh.scalar[original * scalars + s];
+void FrontDecoder::readColours(Mesh& mesh) {
+    const size_t n = header_.colours ? patch_.position.size() : 0;
+    mesh.colour.resize(n);
+    for (uint32_t v = 0; v < n; ++v) {
+        if (const SharedVertex* shared = sharedAt(v)) {
+            mesh.colour[v] = meshes_[shared->patch].colour[shared->vertex];
             continue;
         }
-        std::array<int32_t, 2> code;
-        for (int k = 0; k < 2; ++k) {
-            code[k] = int32_t(uint32_t(predicted_[id][k]) + unzigzag(in_[kNormalX + k].next()));
-            outside_ |= uint32_t(code[k] > top) | uint32_t(code[k] < -top);
-            code[k] = std::clamp(code[k], -top, top);
-        }
-        mesh.normal[id] = {int16_t(restoreNormal(code[0], header_.normal_bits)),
-                           int16_t(restoreNormal(code[1], header_.normal_bits))};
-        const auto [a, b] = patch_.parents[id];
-        size_t sequence = kAttributeValues;
-        if (header_.colours)
-            for (const auto channel : kChannels) {
-                const uint8_t predicted =
-                    a == id ? 0 : average(mesh.colour[a].*channel, mesh.colour[b].*channel);
-                mesh.colour[id].*channel =
-                    uint8_t(predicted + unzigzagByte(uint8_t(in_[sequence++].next())));
-            }
-        for (size_t s = 0; s < scalars; ++s) {
-            const uint32_t predicted =
-                a == id ? 0 : std::bit_cast<uint32_t>(mesh.scalar[a * scalars + s]);
-            mesh.scalar[id * scalars + s] =
-                std::bit_cast<float>(predicted + unzigzag(in_[sequence++].next()));
+        const auto [a, b] = patch_.parents[v];
+        for (size_t k = 0; k < 4; ++k) {
+            const auto channel = kChannels[k];
+            const uint8_t expected =
+                a == v ? 0 : average(mesh.colour[a].*channel, mesh.colour[b].*channel);
+            const auto code = uint8_t(in_[kAttributeValues + k].next());
+            mesh.colour[v].*channel = uint8_t(expected + unzigzagByte(code));
         }
     }
+}
+
+void FrontDecoder::readScalars(Mesh& mesh) {
+    const auto scalars = size_t(header_.scalar_count);
+    mesh.scalar.resize(patch_.position.size() * scalars);
+    const size_t first = kAttributeValues + (header_.colours ? 4 : 0);
+    for (size_t s = 0; s < scalars; ++s)
+        for (uint32_t v = 0; v < patch_.position.size(); ++v) {
+            float& value = mesh.scalar[v * scalars + s];
+            if (const SharedVertex* shared = sharedAt(v)) {
+                value = meshes_[shared->patch].scalar[shared->vertex * scalars + s];
+                continue;
+            }
+            const uint32_t a = patch_.parents[v][0];
+            const uint32_t expected =
+                a == v ? 0 : std::bit_cast<uint32_t>(mesh.scalar[a * scalars + s]);
+            value = std::bit_cast<float>(expected + unzigzag(in_[first + s].next()));
+        }
 }
 
 /// Lets triangles use the originals, and closes the gaps that copies leave.
 void FrontDecoder::dropCopies(Mesh& mesh) {
-    std::vector<uint32_t> number(vertices_);
+    std::vector<uint32_t>& number = final_vertex_;
+    number.resize(mesh.vertexCount());
     const auto scalars = size_t(header_.scalar_count);
     uint32_t kept = 0;
     size_t copy = 0;
-    for (uint32_t id = 0; id < vertices_; ++id) {
+    for (uint32_t id = 0; id < number.size(); ++id) {
         if (copy < copies_.size() && copies_[copy][0] == id) {
             number[id] = number[copies_[copy++][1]];
             continue;
@@ -323,11 +413,12 @@ bool decodeFront(const PageHeader& header, ByteReader& reader, std::vector<Mesh>
     const uint64_t each = 3 * (header.triangleCount() + header.patches.size());
     thread_local std::vector<std::vector<uint32_t>> sequences;
     thread_local StreamUnpacker unpacker;
+    thread_local FrontPatch patch;
     sequences.resize(sequenceCount(header));
     if (!readSequences(reader, each * sequences.size(), unpacker, sequences, fault)) return false;
-    FrontDecoder decoder(header, m, sequences);
-    for (size_t i = 0; i < patches.size(); ++i)
-        if (!decoder.decode(header.patches[i], patches[i])) {
+    FrontDecoder decoder(header, m, sequences, patches, patch);
+    for (uint32_t i = 0; i < patches.size(); ++i)
+        if (!decoder.decode(i)) {
             fault = fmt::format("patch {} does not unfold", i);
             return false;
         }

@@ -49,8 +49,8 @@ int chooseShift(std::span<const uint32_t> numbers) {
     uint64_t sum = 0;
     for (const uint32_t number : numbers) sum += number;
     // From clearly too fine upward, halving the histogram each time.
-    int shift = std::clamp(int(std::bit_width(sum / numbers.size())) - 6, 0, kMaxShift);
-    std::array<uint32_t, 1024> histogram{};
+    int shift = std::clamp(int(std::bit_width(sum / numbers.size())) - 5, 0, kMaxShift);
+    std::array<uint32_t, 512> histogram{};
     uint64_t beyond = 0;
     for (const uint32_t number : numbers) {
         const uint32_t symbol = number >> shift;
@@ -59,17 +59,19 @@ int chooseShift(std::span<const uint32_t> numbers) {
         else
             ++beyond;
     }
+    size_t bins = histogram.size();
+    while (bins > 1 && histogram[bins - 1] == 0) --bins;
     int best = shift;
     uint64_t least = ~uint64_t(0);
-    for (size_t bins = histogram.size(); shift <= kMaxShift && bins >= 64; bins /= 2, ++shift) {
+    for (; shift <= kMaxShift; ++shift) {
         const uint64_t cost =
             estimateCost(std::span(histogram).first(bins), numbers.size(), beyond, shift);
-        if (cost < least) {
-            least = cost;
-            best = shift;
-        }
-        for (size_t i = 0; i < bins / 2; ++i)
-            histogram[i] = histogram[2 * i] + histogram[2 * i + 1];
+        if (cost >= least) break;
+        least = cost;
+        best = shift;
+        bins = (bins + 1) / 2;
+        for (size_t i = 0; i < bins; ++i) histogram[i] = histogram[2 * i] + histogram[2 * i + 1];
+        for (size_t i = bins; i < 2 * bins; ++i) histogram[i] = 0;
     }
     return best;
 }

@@ -2,10 +2,10 @@
 // Meshes for the tests of this folder, and what it means for two meshes to hold the same.
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <random>
-#include <tuple>
 #include <vector>
 
 #include "geometry/lattice.h"
@@ -122,22 +122,30 @@ inline Mesh makeSoup(uint32_t vertices, uint32_t triangles, const PageSettings& 
     return mesh;
 }
 
-/// Everything a vertex carries, with the normal as a page keeps it.
-using VertexValue = std::tuple<int, int, int, int, int, uint32_t, std::vector<uint32_t>>;
+/// Everything a vertex carries, with the normal as a page keeps it: position, normal, colour,
+/// scalars.
+inline constexpr int kMostTestScalars = 5;
+using VertexValue = std::array<uint32_t, 6 + kMostTestScalars>;
 /// The three vertices in order, the least first, and the class of the edge after each.
 using TriangleValue = std::array<std::pair<VertexValue, int>, 3>;
 
 inline VertexValue vertexValue(const Mesh& mesh, size_t v, int normal_bits) {
     const auto normal = [&](int16_t x) {
-        return restoreNormal(quantiseNormal(std::max<int>(x, -32767), normal_bits), normal_bits);
+        const int code = quantiseNormal(std::max<int>(x, -32767), normal_bits);
+        return uint32_t(restoreNormal(code, normal_bits));
     };
-    const size_t scalars = mesh.scalar.size() / mesh.vertexCount();
-    std::vector<uint32_t> values;
-    for (size_t s = 0; s < scalars; ++s)
-        values.push_back(std::bit_cast<uint32_t>(mesh.scalar[v * scalars + s]));
     const Vec3i p = mesh.position[v];
     const uint32_t colour = mesh.colour.empty() ? 0 : std::bit_cast<uint32_t>(mesh.colour[v]);
-    return {p.x, p.y, p.z, normal(mesh.normal[v].x), normal(mesh.normal[v].y), colour, values};
+    VertexValue value = {uint32_t(p.x),
+                         uint32_t(p.y),
+                         uint32_t(p.z),
+                         normal(mesh.normal[v].x),
+                         normal(mesh.normal[v].y),
+                         colour};
+    const size_t scalars = mesh.scalar.size() / mesh.vertexCount();
+    for (size_t s = 0; s < scalars; ++s)
+        value[6 + s] = std::bit_cast<uint32_t>(mesh.scalar[v * scalars + s]);
+    return value;
 }
 
 /// What must survive a page, in a canonical order: all triangles and all vertices.
