@@ -1,6 +1,7 @@
 // The simplifier against meshoptimizer's, in turn, on the same pieces of a scan.
 //
 //   bench_simplify SCAN.obj [PIECE_TRIANGLES=6500] [RATIO=0.5] [SUBDIVISIONS=2] [NOISE=0.05]
+//   [COLOURS=0]
 //
 // The scan is welded, subdivided with noise and cut into pieces by a k-d tree. Both simplify every
 // piece with its border locked. Printed: millions of input triangles a second of processor
@@ -80,6 +81,7 @@ std::vector<Piece> makePieces(const Mesh& mesh, size_t limit, double ratio) {
                     remap[v] = uint32_t(piece.mesh.position.size());
                     piece.mesh.position.push_back(mesh.position[v]);
                     piece.mesh.normal.push_back(mesh.normal[v]);
+                    if (!mesh.colour.empty()) piece.mesh.colour.push_back(mesh.colour[v]);
                 }
                 t[k] = remap[v];
             }
@@ -112,27 +114,46 @@ double squaredDistance(const Vec3d& p, const Vec3d& a, const Vec3d& b, const Vec
     return std::min(toSegment(a, b), std::min(toSegment(b, c), toSegment(c, a)));
 }
 
-/// Squared distances of the input's vertices to the result, by trying all triangles whose box is
-/// near enough: slow and plain, so only a sample of pieces is measured.
+/// Squared distances of the input's vertices to the result. Triangles are tried outward from the
+/// vertex along x until none further out can be nearer.
 struct Quality {
     double sum_sq = 0, max_sq = 0, edge_sum = 0;
     size_t vertices = 0, edges = 0;
+
+    struct Item {
+        double x;  // of the middle of its box
+        Vec3d a, b, c;
+    };
 
     void add(const Mesh& mesh, const std::vector<Vec3i>& position,
              const std::vector<Triangle>& triangle) {
         for (const Triangle& t : mesh.triangle)
             for (int k = 0; k < 3; ++k, ++edges)
                 edge_sum += glm::length(Vec3d(mesh.position[t[k]] - mesh.position[t[(k + 1) % 3]]));
+        std::vector<Item> items;
+        double half_width = 0;
+        for (const Triangle& t : triangle) {
+            const Vec3d a(position[t[0]]), b(position[t[1]]), c(position[t[2]]);
+            const double low = std::min(a.x, std::min(b.x, c.x));
+            const double high = std::max(a.x, std::max(b.x, c.x));
+            items.push_back({(low + high) / 2, a, b, c});
+            half_width = std::max(half_width, (high - low) / 2);
+        }
+        const auto byX = [](const Item& a, const Item& b) { return a.x < b.x; };
+        std::sort(items.begin(), items.end(), byX);
         for (const Vec3i& point : mesh.position) {
             const Vec3d p(point);
             double best = 1e300;
-            for (const Triangle& t : triangle) {
-                const Vec3d a(position[t[0]]), b(position[t[1]]), c(position[t[2]]);
-                const Vec3d outside = glm::max(Vec3d(0), glm::max(glm::min(a, glm::min(b, c)) - p,
-                                                                  p - glm::max(a, glm::max(b, c))));
-                if (glm::dot(outside, outside) >= best) continue;
-                best = std::min(best, squaredDistance(p, a, b, c));
-            }
+            const auto tryItem = [&](const Item& i) {
+                const double gap = std::abs(i.x - p.x) - half_width;
+                if (gap > 0 && gap * gap > best) return false;
+                best = std::min(best, squaredDistance(p, i.a, i.b, i.c));
+                return true;
+            };
+            const auto middle =
+                std::lower_bound(items.begin(), items.end(), Item{p.x, p, p, p}, byX);
+            for (auto i = middle; i != items.end() && tryItem(*i);) ++i;
+            for (auto i = middle; i != items.begin() && tryItem(*(i - 1));) --i;
             sum_sq += best;
             max_sq = std::max(max_sq, best);
             ++vertices;
@@ -179,19 +200,25 @@ double median(std::vector<double> values) {
 
 int main(int argc, char** argv) {
     if (argc < 2) {
-        std::fprintf(stderr,
-                     "usage: bench_simplify SCAN.obj [PIECE] [RATIO] [SUBDIVISIONS] [NOISE]\n");
+        std::fprintf(
+            stderr,
+            "usage: bench_simplify SCAN.obj [PIECE] [RATIO] [SUBDIVISIONS] [NOISE] [COLOURS]\n");
         return 2;
     }
     const size_t piece_triangles = argc > 2 ? size_t(std::atol(argv[2])) : 6500;
     const double ratio = argc > 3 ? std::atof(argv[3]) : 0.5;
     const int subdivisions = argc > 4 ? std::atoi(argv[4]) : 2;
     const double noise = argc > 5 ? std::atof(argv[5]) : 0.05;
+    const bool coloured = argc > 6 && std::atoi(argv[6]) != 0;
 
     constexpr int32_t kExtent = (1 << 21) - 5000;
     test::Shape shape = test::shapeOf(test::toLattice(test::readObj(argv[1]), kExtent));
     for (int i = 0; i < subdivisions; ++i) shape = test::subdivide(shape, noise, unsigned(i));
-    const Mesh mesh = test::toLattice(shape, kExtent);
+    Mesh mesh = test::toLattice(shape, kExtent);
+    for (size_t v = 0; coloured && v < mesh.vertexCount(); ++v) {
+        const Vec3i p = mesh.position[v] / 1000;
+        mesh.colour.push_back({uint8_t(p.x), uint8_t(p.y / 4), uint8_t(p.z * 7), 255});
+    }
     const std::vector<Piece> pieces = makePieces(mesh, piece_triangles, ratio);
     const Rival rival(pieces);
     std::printf("%zu triangles in %zu pieces\n", mesh.triangleCount(), pieces.size());
@@ -227,8 +254,8 @@ int main(int argc, char** argv) {
                 *std::max_element(theirs.begin(), theirs.end()));
 
     Quality quality, rival_quality;
-    const size_t stride = std::max<size_t>(1, pieces.size() * piece_triangles / 60000);
-    for (size_t i = 0; i < pieces.size() && piece_triangles < 20000; i += stride) {
+    const size_t stride = std::max<size_t>(1, pieces.size() * piece_triangles / 200000);
+    for (size_t i = 0; i < pieces.size(); i += stride) {
         const Mesh& m = pieces[i].mesh;
         SimplifyInput in;
         in.mesh = &m;

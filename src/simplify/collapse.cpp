@@ -189,9 +189,6 @@ bool Collapser::tryCollapse(uint32_t u, uint32_t v, const Vec3f& to) {
 
 void Collapser::apply(uint32_t u, uint32_t v, const Vec3f& to) {
     Point &pu = mesh_.point[u], &pv = mesh_.point[v];
-    Quadric q = mesh_.quadric[u].movedBy(to - pu.vec());
-    q.add(mesh_.quadric[v].movedBy(to - pv.vec()));
-    mesh_.quadric[v] = q;
     pv = {to.x, to.y, to.z, pv.flags | (pu.flags & kIrregularFlag)};
     mesh_.killVertex(u);
     mesh_.parent[u] = v;

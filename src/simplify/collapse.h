@@ -45,7 +45,7 @@ public:
         : mesh_(mesh), positions_(positions), kernels_(chooseEdgeKernels()) {}
 
     /// Collapses edge (u, v), both alive, to `to`, if all rules allow it. v remains, and must not
-    /// be of lower rank. Merges positions, quadrics, fans and classes.
+    /// be of lower rank. Merges positions, fans and classes, not quadrics.
     bool tryCollapse(uint32_t u, uint32_t v, const Vec3f& to);
 
     /// After a collapse: the triangles around the vertex that remains, with its neighbours.

@@ -28,6 +28,10 @@ HWY_INLINE V3<V> operator-(const V3<V>& a, const V3<V>& b) {
     return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
 }
 template <class V>
+HWY_INLINE V3<V> scaled(const V3<V>& a, const V& s) {
+    return {hn::Mul(a.x, s), hn::Mul(a.y, s), hn::Mul(a.z, s)};
+}
+template <class V>
 HWY_INLINE V dot(const V3<V>& a, const V3<V>& b) {
     return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
 }
@@ -56,8 +60,7 @@ static_assert(offsetof(Quadric, a02) == 16 && offsetof(Quadric, b0) == 32);
 
 using Row = Columns<hn::Vec<PlaceTag>>;
 
-HWY_INLINE Row loadRow(const void* record, size_t row) {
-    const float* f = static_cast<const float*>(record) + 4 * row;
+HWY_INLINE Row loadRow(const float* f) {
     const PlaceTag d;
     return {hn::Load(d, f), hn::Load(d, f + 1), hn::Load(d, f + 2), hn::Load(d, f + 3)};
 }
@@ -76,8 +79,8 @@ HWY_INLINE Row gather(D, const Load& load) {
 using RowTag = HWY_CAPPED(float, 4);
 using Row = hn::Vec<RowTag>;
 
-HWY_INLINE Row loadRow(const void* record, size_t row) {
-    return hn::Load(RowTag(), static_cast<const float*>(record) + 4 * row);
+HWY_INLINE Row loadRow(const float* f) {
+    return hn::Load(RowTag(), f);
 }
 
 HWY_INLINE Row addRows(const Row& a, const Row& b) {
@@ -112,28 +115,37 @@ HWY_INLINE Columns<hn::Vec<D>> gather(D d, const Load& load) {
 
 #endif
 
-/// Row `row` of each lane's record. note: no lambdas; g++ 12 does not inline all of them.
-template <class Record>
+constexpr size_t kPointFloats = sizeof(Point) / 4, kQuadricFloats = sizeof(Quadric) / 4;
+
+/// Four floats of each lane's record: at base + id * stride. note: no lambdas; g++ 12 does not
+/// inline all of them.
 struct RowOf {
-    const Record* records;
+    const float* base;
+    size_t stride;
     const uint32_t* ids;
-    size_t row;
-    HWY_INLINE Row operator()(size_t i) const { return loadRow(records + ids[i], row); }
+    HWY_INLINE Row operator()(size_t i) const { return loadRow(base + ids[i] * stride); }
 };
 
-/// The sum of rows of two records.
+HWY_INLINE RowOf rowOf(const Point* points, const uint32_t* ids) {
+    return {&points->x, kPointFloats, ids};
+}
+HWY_INLINE RowOf rowOf(const Quadric* quadrics, const uint32_t* ids, size_t row) {
+    return {&quadrics->a00 + 4 * row, kQuadricFloats, ids};
+}
+
+/// The sum of rows of two quadrics.
 struct RowOfBoth {
-    const Quadric* records;
+    const Quadric* quadrics;
     const uint32_t *u, *v;
     size_t row;
     HWY_INLINE Row operator()(size_t i) const {
-        return addRows(loadRow(records + u[i], row), loadRow(records + v[i], row));
+        return addRows(rowOf(quadrics, u, row)(i), rowOf(quadrics, v, row)(i));
     }
 };
 
 template <class D>
 HWY_INLINE V3<hn::Vec<D>> positionsOf(D d, const Point* points, const uint32_t* ids) {
-    return gather(d, RowOf<Point>{points, ids, 0}).xyz();
+    return gather(d, rowOf(points, ids)).xyz();
 }
 
 template <class V>
@@ -142,6 +154,16 @@ struct Symmetric {
 
     HWY_INLINE V3<V> times(const V3<V>& z) const {
         return {dot({a00, a01, a02}, z), dot({a01, a11, a12}, z), dot({a02, a12, a22}, z)};
+    }
+
+    /// Subtracts a b', which is symmetric.
+    HWY_INLINE void subtractProduct(const V3<V>& a, const V3<V>& b) {
+        a00 = hn::Sub(a00, hn::Mul(a.x, b.x));
+        a11 = hn::Sub(a11, hn::Mul(a.y, b.y));
+        a22 = hn::Sub(a22, hn::Mul(a.z, b.z));
+        a01 = hn::Sub(a01, hn::Mul(a.x, b.y));
+        a02 = hn::Sub(a02, hn::Mul(a.x, b.z));
+        a12 = hn::Sub(a12, hn::Mul(a.y, b.z));
     }
 
     /// Solves A z = -g by LDL'.
@@ -173,62 +195,154 @@ HWY_INLINE V snap(D d, V p, const SnapGrid& grid, float low, float high) {
     return hn::Add(hn::Max(hn::Set(d, low), hn::Min(hn::Set(d, high), snapped)), hn::Zero(d));
 }
 
-/// f(z) = z'Az + 2 g'z + c around u, the sum of both quadrics.
-HWY_INLINE void placeLanes(const Point* points, const Quadric* quadrics, const SnapGrid& grid,
-                           EdgeBatch& batch, size_t first) {
+/// The sum of both vertices' quadrics around u: f(z) = z'Az + 2 g'z + c.
+template <class V>
+struct EdgeQuadric {
+    Symmetric<V> a;
+    V3<V> g;
+    V c;
+    V weight, weight_v;
+    V3<V> back;  // from v to u
+
+    HWY_INLINE V valueAt(const V3<V>& z) const { return hn::Add(dot(a.times(z) + g + g, z), c); }
+};
+
+/// What the attributes' best values depend on: value = value of u + (D + G.z) / weight, see
+/// attributes.h.
+template <class V>
+struct EdgeAttribute {
+    V3<V> gradient;  // G
+    V offset;        // D
+    V value_u;
+    V rise;  // from u to v
+};
+
+/// Takes the attributes, at their best values, out of the quadric.
+template <class D, class V>
+HWY_INLINE void reduceAttribute(D d, const Columns<V>& of_u, const Columns<V>& of_v,
+                                EdgeQuadric<V>& q, EdgeAttribute<V>& attribute) {
+    const V step = hn::Neg(attribute.rise);
+    const V moved = hn::Add(of_v.c3, dot(of_v.xyz(), q.back));
+    const V weighted = hn::Mul(q.weight_v, step);
+    q.c = hn::Add(q.c, hn::Mul(step, hn::Sub(weighted, hn::Add(moved, moved))));
+    q.g = q.g - scaled(of_v.xyz(), step);
+    attribute.gradient = of_u.xyz() + of_v.xyz();
+    attribute.offset = hn::Sub(hn::Add(of_u.c3, moved), weighted);
+    const V inverse = hn::Div(hn::Set(d, 1.0f), q.weight);
+    const V3<V> mean = scaled(attribute.gradient, inverse);
+    q.a.subtractProduct(mean, attribute.gradient);
+    q.g = q.g - scaled(mean, attribute.offset);
+    q.c = hn::Sub(q.c, hn::Mul(hn::Mul(attribute.offset, attribute.offset), inverse));
+}
+
+template <class D, class V>
+HWY_INLINE void reduceAttributes(D d, const AttributeView& view, const uint32_t* u,
+                                 const uint32_t* v, EdgeQuadric<V>& q,
+                                 EdgeAttribute<V>* attributes) {
+    for (uint32_t j = 0; j < view.count; ++j) {
+        if (j % 4 == 0) {
+            const auto values_u = gather(d, RowOf{view.value + j, view.value_stride, u});
+            const auto values_v = gather(d, RowOf{view.value + j, view.value_stride, v});
+            const V of_u[4] = {values_u.c0, values_u.c1, values_u.c2, values_u.c3};
+            const V of_v[4] = {values_v.c0, values_v.c1, values_v.c2, values_v.c3};
+            for (uint32_t k = 0; k < 4 && j + k < view.count; ++k) {
+                attributes[j + k].value_u = of_u[k];
+                attributes[j + k].rise = hn::Sub(of_v[k], of_u[k]);
+            }
+        }
+        const float* rows = &view.row->gx + 4 * j;
+        reduceAttribute(d, gather(d, RowOf{rows, 4 * size_t(view.count), u}),
+                        gather(d, RowOf{rows, 4 * size_t(view.count), v}), q, attributes[j]);
+    }
+}
+
+/// The value at z, within those of both ends; returns what it costs not to take the best one.
+template <class D, class M, class V>
+HWY_INLINE V attributeAt(D d, const EdgeQuadric<V>& q, const EdgeAttribute<V>& attribute,
+                         const V3<V>& z, M at_u, M at_v, float* value) {
+    const V best = hn::Div(hn::Add(attribute.offset, dot(attribute.gradient, z)), q.weight);
+    const V zero = hn::Zero(d), rise = attribute.rise;
+    V t = hn::Max(hn::Min(zero, rise), hn::Min(hn::Max(zero, rise), best));
+    t = hn::IfThenElse(at_u, zero, hn::IfThenElse(at_v, rise, t));
+    hn::Store(hn::Add(attribute.value_u, t), d, value);
+    const V off = hn::Sub(t, best);
+    return hn::Mul(q.weight, hn::Mul(off, off));
+}
+
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE EdgeQuadric<V> sumQuadrics(D d, const Quadric* quadrics, const uint32_t* u,
+                                      const uint32_t* v, const V3<V>& back) {
+    const Columns<V> v0 = gather(d, rowOf(quadrics, v, 0));
+    const Columns<V> v1 = gather(d, rowOf(quadrics, v, 1));
+    const Columns<V> v2 = gather(d, rowOf(quadrics, v, 2));
+    const Columns<V> s0 = gather(d, RowOfBoth{quadrics, u, v, 0});
+    const Columns<V> s1 = gather(d, RowOfBoth{quadrics, u, v, 1});
+    const Columns<V> s2 = gather(d, RowOfBoth{quadrics, u, v, 2});
+    const Symmetric<V> of_v{v0.c0, v0.c1, v0.c2, v0.c3, v1.c0, v1.c1};
+    const V3<V> moved = of_v.times(back), b = v2.xyz();
+    return {{s0.c0, s0.c1, s0.c2, s0.c3, s1.c0, s1.c1},
+            s2.xyz() + moved,
+            hn::Add(s1.c2, dot(moved + b + b, back)),
+            hn::Max(s1.c3, hn::Set(d, 1e-30f)),
+            v1.c3,
+            back};
+}
+
+template <bool kAttributes>
+HWY_INLINE void placeLanes(const Point* points, const Quadric* quadrics, const AttributeView& view,
+                           const SnapGrid& grid, EdgeBatch& batch, size_t first) {
     using V = hn::Vec<PlaceTag>;
     const PlaceTag d;
     const hn::RebindToSigned<PlaceTag> di;
     const uint32_t *u = batch.u + first, *v = batch.v + first;
-    const Columns<V> at_u = gather(d, RowOf<Point>{points, u, 0});
-    const Columns<V> at_v = gather(d, RowOf<Point>{points, v, 0});
-    const Columns<V> v0 = gather(d, RowOf<Quadric>{quadrics, v, 0});
-    const Columns<V> v1 = gather(d, RowOf<Quadric>{quadrics, v, 1});
-    const Columns<V> v2 = gather(d, RowOf<Quadric>{quadrics, v, 2});
-    const Columns<V> s0 = gather(d, RowOfBoth{quadrics, u, v, 0});
-    const Columns<V> s1 = gather(d, RowOfBoth{quadrics, u, v, 1});
-    const Columns<V> s2 = gather(d, RowOfBoth{quadrics, u, v, 2});
+    const Columns<V> of_u = gather(d, rowOf(points, u)), of_v = gather(d, rowOf(points, v));
+    const V3<V> at_u = of_u.xyz(), at_v = of_v.xyz(), edge = at_v - at_u;
+    EdgeQuadric<V> q = sumQuadrics(d, quadrics, u, v, at_u - at_v);
+    EdgeAttribute<V> attributes[kAttributes ? kMaxQuadricAttributes : 1];
+    if constexpr (kAttributes) reduceAttributes(d, view, u, v, q, attributes);
 
-    const V3<V> edge = at_v.xyz() - at_u.xyz();
-    const V3<V> back = at_u.xyz() - at_v.xyz();
-    const Symmetric<V> of_v{v0.c0, v0.c1, v0.c2, v0.c3, v1.c0, v1.c1};
-    const V3<V> moved = of_v.times(back), b = v2.xyz();
-    const V3<V> g = s2.xyz() + moved;
-    const V c = hn::Add(s1.c2, dot(moved + b + b, back));
-    const Symmetric<V> a{s0.c0, s0.c1, s0.c2, s0.c3, s1.c0, s1.c1};
-
-    const V3<V> optimum = a.solveNegative(d, g);
-    const V half = hn::Set(d, 0.5f);
-    const V3<V> middle{hn::Mul(edge.x, half), hn::Mul(edge.y, half), hn::Mul(edge.z, half)};
+    const V3<V> optimum = q.a.solveNegative(d, q.g);
+    const V3<V> middle = scaled(edge, hn::Set(d, 0.5f));
     const V3<V> off = optimum - middle;
     const auto near = hn::Le(dot(off, off), dot(edge, edge));
-    const V3<V> place = at_u.xyz() + select(near, optimum, middle);
+    const V3<V> place = at_u + select(near, optimum, middle);
     const V3<V> snapped{snap(d, place.x, grid, grid.low.x, grid.high.x),
                         snap(d, place.y, grid, grid.low.y, grid.high.y),
                         snap(d, place.z, grid, grid.low.z, grid.high.z)};
 
-    const auto rank_mask = hn::Set(di, int32_t(kRankMask));
-    const auto rank_u = hn::And(hn::BitCast(di, at_u.c3), rank_mask);
-    const auto rank_v = hn::And(hn::BitCast(di, at_v.c3), rank_mask);
-    V3<V> to = select(hn::RebindMask(d, hn::Gt(rank_u, rank_v)), at_u.xyz(), snapped);
-    to = select(hn::RebindMask(d, hn::Gt(rank_v, rank_u)), at_v.xyz(), to);
     // A curve keeps vertices of its own: the end with the lower cost, v where f(edge) < f(0).
-    const auto curve = hn::Set(di, int32_t(kRankCurve));
-    const auto on_curve = hn::And(hn::Eq(rank_u, curve), hn::Eq(rank_v, curve));
-    const auto v_is_better = hn::Lt(dot(a.times(edge) + g + g, edge), hn::Zero(d));
-    to = select(hn::RebindMask(d, on_curve), select(v_is_better, at_v.xyz(), at_u.xyz()), to);
+    const auto rank_mask = hn::Set(di, int32_t(kRankMask)),
+               curve = hn::Set(di, int32_t(kRankCurve));
+    const auto rank_u = hn::And(hn::BitCast(di, of_u.c3), rank_mask);
+    const auto rank_v = hn::And(hn::BitCast(di, of_v.c3), rank_mask);
+    const auto on_curve = hn::RebindMask(d, hn::And(hn::Eq(rank_u, curve), hn::Eq(rank_v, curve)));
+    const auto v_is_better = hn::Lt(dot(q.a.times(edge) + q.g + q.g, edge), hn::Zero(d));
+    const auto to_u =
+        hn::Or(hn::RebindMask(d, hn::Gt(rank_u, rank_v)), hn::AndNot(v_is_better, on_curve));
+    const auto to_v =
+        hn::Or(hn::RebindMask(d, hn::Gt(rank_v, rank_u)), hn::And(v_is_better, on_curve));
+    const V3<V> to = select(to_u, at_u, select(to_v, at_v, snapped));
 
-    const V3<V> z = to - at_u.xyz();
-    const V cost = hn::Add(dot(a.times(z) + g + g, z), c);
+    const V3<V> z = to - at_u;
+    V cost = q.valueAt(z);
+    if constexpr (kAttributes)
+        for (uint32_t j = 0; j < view.count; ++j)
+            cost = hn::Add(cost,
+                           attributeAt(d, q, attributes[j], z, to_u, to_v, batch.value[j] + first));
     hn::Store(hn::Max(cost, hn::Zero(d)), d, batch.cost + first);
     hn::Store(to.x, d, batch.x + first);
     hn::Store(to.y, d, batch.y + first);
     hn::Store(to.z, d, batch.z + first);
 }
 
-void place(const Point* points, const Quadric* quadrics, const SnapGrid& grid, EdgeBatch& batch) {
-    for (size_t i = 0; i < kBatch; i += hn::MaxLanes(PlaceTag()))
-        placeLanes(points, quadrics, grid, batch, i);
+void place(const Point* points, const Quadric* quadrics, const AttributeView& attributes,
+           const SnapGrid& grid, EdgeBatch& batch) {
+    for (size_t i = 0; i < kBatch; i += hn::MaxLanes(PlaceTag())) {
+        if (attributes.count == 0)
+            placeLanes<false>(points, quadrics, attributes, grid, batch, i);
+        else
+            placeLanes<true>(points, quadrics, attributes, grid, batch, i);
+    }
 }
 
 HWY_INLINE uint32_t foldingLanes(const Point* points, const uint32_t* apex, const uint32_t* next,

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "simplify/attribute_rows.h"
 #include "simplify/working_mesh.h"
 
 namespace pietra {
@@ -24,15 +25,16 @@ struct SnapGrid {
 struct alignas(64) EdgeBatch {
     uint32_t u[kBatch], v[kBatch];
     float cost[kBatch];  ///< the quadrics' value at the place, >= 0
-    float x[kBatch], y[kBatch],
-        z[kBatch];  ///< on the grid; the end of higher rank where ranks differ
+    float x[kBatch], y[kBatch], z[kBatch];  ///< on the grid; an end where only that may be
+    /// Of the attributes in the quadrics, there.
+    float value[kMaxQuadricAttributes][kBatch];
 };
 
 struct EdgeKernels {
     /// Minimum of both quadrics' sum, or the edge's middle where that is further than an edge away,
     /// rounded to the grid.
-    void (*place)(const Point* points, const Quadric* quadrics, const SnapGrid& grid,
-                  EdgeBatch& batch);
+    void (*place)(const Point* points, const Quadric* quadrics, const AttributeView& attributes,
+                  const SnapGrid& grid, EdgeBatch& batch);
     /// Triangles (apex, next, previous) of which the apex moves to `to`: a bit for each that turns
     /// too far or becomes a sliver. Reads eight of each array.
     uint32_t (*foldingTriangles)(const Point* points, const uint32_t* apex, const uint32_t* next,

@@ -25,63 +25,49 @@ bool isPlainFan(WorkingMesh& mesh, const Fan& fan) {
     return true;
 }
 
-struct EdgeUse {
-    uint32_t neighbour;
-    EdgeClass edge_class;
-    bool operator<(const EdgeUse& o) const { return neighbour < o.neighbour; }
-};
-
 uint32_t expectedUses(EdgeClass c) {
     return c == EdgeClass::kManifold ? 2 : c == EdgeClass::kBorder ? 1 : 3;
 }
 
-class FanClassifier {
-public:
-    uint32_t flagsOf(const WorkingMesh& mesh, const Fan& fan) {
-        collectUses(mesh, fan);
-        uint32_t border_edges = 0, triple_edges = 0;
-        for (size_t i = 0, end; i < uses_.size(); i = end) {
-            end = i + 1;
-            bool agree = true;
-            for (; end < uses_.size() && uses_[end].neighbour == uses_[i].neighbour; ++end)
-                agree = agree && uses_[end].edge_class == uses_[i].edge_class;
-            const EdgeClass c = uses_[i].edge_class;
-            if (!agree || c == EdgeClass::kMany || end - i != expectedUses(c))
-                return kRankFixed | kOuterFlag;
-            border_edges += c == EdgeClass::kBorder;
-            triple_edges += c == EdgeClass::kTriple;
-        }
-        if (border_edges + triple_edges == 0) return kRankFree;
-        const bool curve = border_edges + triple_edges == 2 && border_edges != 1;
-        return curve ? uint32_t(kRankCurve) : uint32_t(kRankFixed);
-    }
-
-private:
-    void collectUses(const WorkingMesh& mesh, const Fan& fan) {
-        uses_.clear();
-        for (uint32_t i = 0; i < fan.count; ++i) {
-            const uint32_t corner = mesh.corner[fan.begin + i];
-            const Face& face = mesh.face[corner >> 2];
-            const uint32_t k = corner & 3, previous = kPreviousCorner[k];
-            uses_.push_back({face.v[kNextCorner[k]], face.edgeClass(k)});
-            uses_.push_back({face.v[previous], face.edgeClass(previous)});
-        }
-        std::sort(uses_.begin(), uses_.end());
-    }
-
-    std::vector<EdgeUse> uses_;
-};
-
 }  // namespace
 
-uint32_t classifyVertices(WorkingMesh& mesh) {
-    FanClassifier classifier;
+void VertexClassifier::collectUses(const WorkingMesh& mesh, const Fan& fan) {
+    uses_.clear();
+    for (uint32_t i = 0; i < fan.count; ++i) {
+        const uint32_t corner = mesh.corner[fan.begin + i];
+        const Face& face = mesh.face[corner >> 2];
+        const uint32_t k = corner & 3, previous = kPreviousCorner[k];
+        uses_.push_back({face.v[kNextCorner[k]], face.edgeClass(k)});
+        uses_.push_back({face.v[previous], face.edgeClass(previous)});
+    }
+    std::sort(uses_.begin(), uses_.end());
+}
+
+uint32_t VertexClassifier::flagsOf(const WorkingMesh& mesh, const Fan& fan) {
+    collectUses(mesh, fan);
+    uint32_t border_edges = 0, triple_edges = 0;
+    for (size_t i = 0, end; i < uses_.size(); i = end) {
+        end = i + 1;
+        bool agree = true;
+        for (; end < uses_.size() && uses_[end].neighbour == uses_[i].neighbour; ++end)
+            agree = agree && uses_[end].edge_class == uses_[i].edge_class;
+        const EdgeClass c = uses_[i].edge_class;
+        if (!agree || c == EdgeClass::kMany || end - i != expectedUses(c))
+            return kRankFixed | kOuterFlag;
+        border_edges += c == EdgeClass::kBorder;
+        triple_edges += c == EdgeClass::kTriple;
+    }
+    if (border_edges + triple_edges == 0) return kRankFree;
+    const bool curve = border_edges + triple_edges == 2 && border_edges != 1;
+    return curve ? uint32_t(kRankCurve) : uint32_t(kRankFixed);
+}
+
+uint32_t VertexClassifier::run(WorkingMesh& mesh) {
     uint32_t outer = 0;
     for (size_t v = 0; v < mesh.point.size(); ++v) {
         const Fan& fan = mesh.fan[v];
-        const uint32_t flags = isPlainFan(mesh, fan)
-                                   ? uint32_t(kRankFree)
-                                   : classifier.flagsOf(mesh, fan) | kIrregularFlag;
+        const uint32_t flags =
+            isPlainFan(mesh, fan) ? uint32_t(kRankFree) : flagsOf(mesh, fan) | kIrregularFlag;
         mesh.point[v].flags = flags;
         outer += (flags & kOuterFlag) != 0;
     }

@@ -55,6 +55,9 @@ struct SimplifyInput {
     /// Lattice units: a component without locked vertices whose diameter is below this (or below
     /// the error reached so far) may be dropped when collapses are stuck, before clustering begins.
     float droppable_error = 0;
+    /// One a scalar: the width of its range over the whole model, which counts as much as that of a
+    /// colour. Empty: its range in this mesh.
+    std::span<const float> scalar_range;
 };
 
 struct SimplifyOutput {

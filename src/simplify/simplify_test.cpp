@@ -1,6 +1,7 @@
 #include "simplify/simplify.h"
 
 #include <gtest/gtest.h>
+#include <hwy/targets.h>
 
 #include <algorithm>
 #include <set>
@@ -20,6 +21,7 @@ struct Case {
     std::vector<uint32_t> quota;
     int shift = 0;
     float droppable_error = 0;
+    int scalar_count = 0;
 
     SimplifyInput input() const {
         SimplifyInput in;
@@ -28,6 +30,7 @@ struct Case {
         in.quota = quota;
         in.shift = shift;
         in.droppable_error = droppable_error;
+        in.scalar_count = scalar_count;
         return in;
     }
 };
@@ -192,7 +195,7 @@ void expectAllInvariants(const Case& c, const SimplifyOutput& out) {
 
 bool sameMesh(const Mesh& a, const Mesh& b) {
     return a.position == b.position && a.triangle == b.triangle && a.edge_class == b.edge_class &&
-           a.normal == b.normal && a.colour == b.colour;
+           a.normal == b.normal && a.colour == b.colour && a.scalar == b.scalar;
 }
 
 long eulerCharacteristic(const Mesh& mesh) {
@@ -506,6 +509,159 @@ TEST(Simplifier, invariantsHoldOnRandomMesses) {
             if (::testing::Test::HasFailure()) return;
         }
     }
+}
+
+/// A flat grid of 60 x 60 squares, 60000 wide, with colours and one scalar from functions of x and
+/// y in 0..1.
+template <class Colour, class Scalar>
+Case paintedGrid(const Colour& colour, const Scalar& scalar, double ratio) {
+    Case c = wholeCase(toLattice(gridShape(60, 0), 60000), ratio);
+    c.scalar_count = 1;
+    for (const Vec3i& p : c.mesh.position) {
+        const double x = (p.x - 1000) / 60000.0, y = (p.y - 1000) / 60000.0;
+        c.mesh.colour.push_back(colour(x, y));
+        c.mesh.scalar.push_back(scalar(x, y));
+    }
+    return c;
+}
+
+/// Calls visit(x, y, colour as doubles, scalar) at the middles of a fine raster over the result.
+template <class Visit>
+void visitSurface(const Mesh& mesh, const Visit& visit) {
+    for (const Triangle& t : mesh.triangle) {
+        const Vec3d a(mesh.position[t[0]]), b(mesh.position[t[1]]), c(mesh.position[t[2]]);
+        const double area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+        const Vec3d low = glm::min(a, glm::min(b, c)), high = glm::max(a, glm::max(b, c));
+        for (double y = std::floor(low.y / 250) * 250 + 125; y < high.y; y += 250)
+            for (double x = std::floor(low.x / 250) * 250 + 125; x < high.x; x += 250) {
+                const double v = ((x - a.x) * (c.y - a.y) - (y - a.y) * (c.x - a.x)) / area;
+                const double w = ((b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x)) / area;
+                if (v < 0 || w < 0 || v + w > 1) continue;
+                const double weight[3] = {1 - v - w, v, w};
+                Vec3d colour(0);
+                double scalar = 0;
+                for (int k = 0; k < 3; ++k) {
+                    const Rgba8 q = mesh.colour[t[k]];
+                    colour += weight[k] * Vec3d(q.r, q.g, q.b);
+                    scalar += weight[k] * double(mesh.scalar[t[k]]);
+                }
+                visit((x - 1000) / 60000, (y - 1000) / 60000, colour, scalar);
+            }
+    }
+}
+
+TEST(Simplifier, edgesOfColoursAndScalarsSurvive) {
+    // A red disc on blue, and a step of the scalar along a diagonal, on a flat surface.
+    const auto inDisc = [](double x, double y) { return std::hypot(x - 0.4, y - 0.6) < 0.25; };
+    const Case c = paintedGrid(
+        [&](double x, double y) {
+            return inDisc(x, y) ? Rgba8{250, 10, 0, 255} : Rgba8{0, 10, 250, 255};
+        },
+        [](double x, double y) { return x + y > 1 ? 7.0f : -1.0f; }, 0.08);
+    const SimplifyOutput out = simplify(c);
+    expectAllInvariants(c, out);
+    expectQuotasMet(c, out);
+    double colour_error = 0, scalar_error = 0, count = 0;
+    visitSurface(out.mesh, [&](double x, double y, const Vec3d& colour, double scalar) {
+        colour_error += std::abs(colour.r - (inDisc(x, y) ? 250 : 0)) / 250;
+        scalar_error += std::abs(scalar - (x + y > 1 ? 7 : -1)) / 8;
+        ++count;
+    });
+    // Of the input itself: 0.9 and 1.1 %. Measured: 1.0 and 0.9 %, by interpolation alone 3.4 and 4.0.
+    EXPECT_LT(colour_error / count, 0.015);
+    EXPECT_LT(scalar_error / count, 0.015);
+}
+
+TEST(Simplifier, linearColoursAndScalarsStayLinear) {
+    const Case c = paintedGrid(
+        [](double x, double y) {
+            return Rgba8{uint8_t(255 * x + 0.5), uint8_t(255 * y + 0.5), 77,
+                         uint8_t(200 * x + 0.5)};
+        },
+        [](double x, double y) { return float(1000 + 3 * x - 2 * y); }, 0.05);
+    const SimplifyOutput out = simplify(c);
+    expectAllInvariants(c, out);
+    expectQuotasMet(c, out);
+    visitSurface(out.mesh, [&](double x, double y, const Vec3d& colour, double scalar) {
+        EXPECT_NEAR(colour.r, 255 * x, 3);
+        EXPECT_NEAR(colour.g, 255 * y, 3);
+        EXPECT_NEAR(colour.b, 77, 0.01);
+        EXPECT_NEAR(scalar, 1000 + 3 * x - 2 * y, 0.04);
+    });
+}
+
+TEST(Simplifier, whatIsNoNumberSpreadsNoFurther) {
+    const Case c = paintedGrid(
+        [](double, double) {
+            return Rgba8{1, 2, 3, 4};
+        },
+        [](double x, double y) { return std::hypot(x - 0.5, y - 0.5) < 0.1 ? NAN : 5.0f; }, 0.2);
+    const SimplifyOutput out = simplify(c);
+    expectAllInvariants(c, out);
+    size_t numbers = 0;
+    for (size_t v = 0; v < out.mesh.vertexCount(); ++v) {
+        const Vec3d p = (Vec3d(out.mesh.position[v]) - 1000.0) / 60000.0;
+        if (std::hypot(p.x - 0.5, p.y - 0.5) > 0.2) {
+            EXPECT_EQ(out.mesh.scalar[v], 5.0f);
+            ++numbers;
+        }
+        EXPECT_EQ(out.mesh.colour[v], (Rgba8{1, 2, 3, 4}));
+    }
+    EXPECT_GT(numbers, 50u);
+}
+
+TEST(Simplifier, verticesThatStayKeepTheirAttributes) {
+    Mesh whole = toLattice(gridShape(40, 0.1), 40000);
+    std::mt19937 random(3);
+    for (uint32_t v = 0; v < whole.vertexCount(); ++v) {
+        whole.colour.push_back(
+            {uint8_t(random()), uint8_t(random()), uint8_t(random()), uint8_t(random())});
+        whole.normal[v] = encodeNormal({float(random() % 99) - 49, float(random() % 99) - 49, 9});
+    }
+    const Case c = octantCase(extract(whole, [&](uint32_t t) { return t % 80 < 50; }), 0.2);
+    const SimplifyOutput out = simplify(c);
+    expectAllInvariants(c, out);
+    size_t kept = 0;
+    const EdgeClasses edges = edgeClasses(c.mesh);
+    std::set<uint64_t> staying;
+    for (const auto& [edge, classes] : edges)
+        if (!isComplete(classes) || classes[0] == EdgeClass::kBorder)
+            staying.insert({edge.first, edge.second});
+    std::map<uint64_t, uint32_t> at;
+    for (uint32_t v = 0; v < c.mesh.vertexCount(); ++v) at[latticeKey(c.mesh.position[v])] = v;
+    for (uint32_t v = 0; v < out.mesh.vertexCount(); ++v) {
+        const uint64_t key = latticeKey(out.mesh.position[v]);
+        if (!staying.count(key)) continue;
+        ++kept;
+        EXPECT_EQ(out.mesh.colour[v], c.mesh.colour[at[key]]);
+        EXPECT_EQ(out.mesh.normal[v], c.mesh.normal[at[key]]);
+    }
+    EXPECT_GT(kept, 50u);
+}
+
+TEST(Simplifier, sameBytesOnEveryInstructionSet) {
+    Case c = octantCase(
+        toLattice(subdivide(shapeOf(toLattice(sphereShape(16), 100000)), 0.1, 5), 100000), 0.3);
+    c.scalar_count = 1;
+    std::mt19937 random(3);
+    for (uint32_t v = 0; v < c.mesh.vertexCount(); ++v) {
+        c.mesh.colour.push_back({uint8_t(random()), uint8_t(random()), 9, 255});
+        c.mesh.scalar.push_back(float(random() % 1000));
+    }
+    const Case book = wholeCase(toLattice(bookShape(20), 20000), 0.1);
+    const SimplifyOutput first = simplify(c), first_book = simplify(book);
+    int targets = 0;
+    for (int64_t all = hwy::SupportedTargets(), target = 1; all != 0; target *= 2) {
+        if ((all & target) == 0) continue;
+        all &= ~target;
+        hwy::SetSupportedTargetsForTest(target);
+        const SimplifyOutput out = simplify(c), out_book = simplify(book);
+        hwy::SetSupportedTargetsForTest(0);
+        EXPECT_TRUE(sameMesh(first.mesh, out.mesh)) << hwy::TargetName(target);
+        EXPECT_TRUE(sameMesh(first_book.mesh, out_book.mesh)) << hwy::TargetName(target);
+        ++targets;
+    }
+    EXPECT_GE(targets, 2);
 }
 
 TEST(Simplifier, scansKeepTheirTopology) {

@@ -6,6 +6,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "geometry/mesh.h"
@@ -61,6 +62,9 @@ struct Fan {
 };
 
 struct WorkingMesh {
+    /// Sets everything but ranks, outer flags and quadrics.
+    void load(const Mesh& in, std::span<const uint8_t> cell, std::span<const uint32_t> quota);
+
     Vec3i centre{0, 0, 0};
     std::vector<Point> point;
     std::vector<Quadric> quadric;
@@ -103,6 +107,9 @@ struct WorkingMesh {
         const Point& p = point[v];
         return centre + Vec3i(int32_t(p.x), int32_t(p.y), int32_t(p.z));
     }
+
+private:
+    void buildFans();
 };
 
 }  // namespace pietra

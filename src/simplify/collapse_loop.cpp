@@ -1,0 +1,154 @@
+#include "simplify/collapse_loop.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace pietra {
+
+void CollapseLoop::run(const SnapGrid& grid) {
+    grid_ = grid;
+    queue_.clear();
+    collapses_ = 0;
+    worst_deviation_sq_ = 0;
+    fillPositions();
+    // What was rejected may be allowed when its surroundings have changed: so again, until nothing
+    // is.
+    for (uint32_t before = ~0u; mesh_.cells_above > 0 && before != collapses_;) {
+        before = collapses_;
+        pushAllEdges();
+        while (mesh_.cells_above > 0 && queue_.lowestBucket() != CollapseQueue::kNoBucket) {
+            popCandidates();
+            collapseCandidates();
+        }
+    }
+}
+
+void CollapseLoop::fillPositions() {
+    positions_.reset(2 * mesh_.point.size());
+    for (uint32_t v = 0; v < mesh_.point.size(); ++v)
+        if (!mesh_.point[v].dead()) positions_.insert(mesh_, v);
+}
+
+/// Fills the lanes beyond `count`, which must not be 0, and evaluates.
+void CollapseLoop::place(EdgeBatch& edges, uint32_t count) const {
+    for (uint32_t i = count; i < kBatch; ++i) {
+        edges.u[i] = edges.u[0];
+        edges.v[i] = edges.v[0];
+    }
+    kernels_.place(mesh_.point.data(), mesh_.quadric.data(), attributes_.view(), grid_, edges);
+}
+
+void CollapseLoop::pushEdge(uint32_t u, uint32_t v) {
+    pending_.u[pending_count_] = u;
+    pending_.v[pending_count_] = v;
+    __builtin_prefetch(&mesh_.quadric[v]);
+    if (++pending_count_ == kBatch) flushPending();
+}
+
+void CollapseLoop::flushPending() {
+    if (pending_count_ == 0) return;
+    place(pending_, pending_count_);
+    for (uint32_t i = 0; i < pending_count_; ++i) {
+        const uint32_t u = pending_.u[i], v = pending_.v[i];
+        const uint32_t stamp = mesh_.stamp[u] + mesh_.stamp[v];
+        if (stamp < WorkingMesh::kDeadStamp) queue_.push(pending_.cost[i], {u, v, stamp});
+    }
+    pending_count_ = 0;
+}
+
+/// Each edge once where triangles are plain; irregular ones maybe twice, which does no harm.
+void CollapseLoop::pushAllEdges() {
+    for (const Face& face : mesh_.face) {
+        if (face.dead()) continue;
+        for (uint32_t k = 0; k < 3; ++k) {
+            const uint32_t u = face.v[k], v = face.v[kNextCorner[k]];
+            const uint32_t shared_flags = mesh_.point[u].flags & mesh_.point[v].flags;
+            if (u > v && !(shared_flags & kIrregularFlag)) continue;
+            if (collapsibleEdge(mesh_, face, k)) pushEdge(u, v);
+        }
+    }
+    flushPending();
+}
+
+/// The edges of `v`, whose ring the collapser has just read.
+void CollapseLoop::pushEdgesAround(uint32_t v) {
+    const Ring& ring = collapser_.ring();
+    const uint32_t epoch = mesh_.epoch += 2;
+    const auto visit = [&](uint32_t w, const Face& face, uint32_t edge) {
+        if (mesh_.mark[w] == epoch) return;
+        mesh_.mark[w] = epoch;
+        if (collapsibleEdge(mesh_, face, edge)) pushEdge(v, w);
+    };
+    for (uint32_t i = 0; i < ring.size; ++i) {
+        const Face& face = mesh_.face[ring.corner[i] >> 2];
+        const uint32_t k = ring.corner[i] & 3;
+        visit(ring.next[i], face, k);
+        visit(ring.previous[i], face, kPreviousCorner[k]);
+    }
+}
+
+/// Edges of the lowest bucket as they are now, up to a batch; fewer, or none, where it has no more.
+void CollapseLoop::popCandidates() {
+    Candidates& batch = candidates_;
+    batch.count = 0;
+    const uint32_t bucket = queue_.lowestBucket();
+    while (batch.count < kBatch && !queue_.empty(bucket)) {
+        const CollapseQueue::Entry e = queue_.pop(bucket);
+        if (!stillThere(e.u, e.v, e.stamp)) continue;
+        const bool swap = mesh_.point[e.u].rank() > mesh_.point[e.v].rank();
+        batch.edges.u[batch.count] = swap ? e.v : e.u;
+        batch.edges.v[batch.count] = swap ? e.u : e.v;
+        batch.stamp[batch.count++] = e.stamp;
+        __builtin_prefetch(&mesh_.fan[e.u]);
+        __builtin_prefetch(&mesh_.fan[e.v]);
+        __builtin_prefetch(&mesh_.quadric[e.u]);
+        __builtin_prefetch(&mesh_.quadric[e.v]);
+    }
+}
+
+void CollapseLoop::prefetchCandidates() const {
+    const EdgeBatch& edges = candidates_.edges;
+    for (uint32_t i = 0; i < candidates_.count; ++i) {
+        for (const uint32_t v : {edges.u[i], edges.v[i]}) {
+            __builtin_prefetch(&mesh_.corner[mesh_.fan[v].begin]);
+            attributes_.prefetch(v);
+        }
+        positions_.prefetch({edges.x[i], edges.y[i], edges.z[i]});
+    }
+    for (uint32_t i = 0; i < candidates_.count; ++i)
+        for (const uint32_t v : {edges.u[i], edges.v[i]}) {
+            const Fan& fan = mesh_.fan[v];
+            for (uint32_t j = 0; j < fan.count; ++j)
+                __builtin_prefetch(&mesh_.face[mesh_.corner[fan.begin + j] >> 2]);
+        }
+}
+
+void CollapseLoop::collapseCandidates() {
+    if (candidates_.count == 0) return;
+    place(candidates_.edges, candidates_.count);
+    prefetchCandidates();
+    for (uint32_t i = 0; i < candidates_.count && mesh_.cells_above > 0; ++i) {
+        const uint32_t v = candidates_.edges.v[i];
+        if (!stillThere(candidates_.edges.u[i], v, candidates_.stamp[i])) continue;
+        if (collapse(i)) pushEdgesAround(v);
+    }
+    flushPending();
+}
+
+bool CollapseLoop::collapse(uint32_t lane) {
+    const EdgeBatch& edges = candidates_.edges;
+    const uint32_t u = edges.u[lane], v = edges.v[lane];
+    const Vec3f from = mesh_.point[u].vec(), to = mesh_.point[v].vec();
+    const Vec3f at{edges.x[lane], edges.y[lane], edges.z[lane]};
+    if (!collapser_.tryCollapse(u, v, at)) return false;
+    std::array<float, kMaxQuadricAttributes> values;
+    for (uint32_t j = 0; j < attributes_.view().count; ++j) values[j] = edges.value[j][lane];
+    attributes_.merge(mesh_, u, v, from, to, at, values.data());
+    if (!positions_.insert(mesh_, v)) fillPositions();
+    ++collapses_;
+    const float area = mesh_.quadric[v].area;
+    if (area > 0) worst_deviation_sq_ = std::max(worst_deviation_sq_, edges.cost[lane] / area);
+    return true;
+}
+
+}  // namespace pietra
