@@ -88,7 +88,7 @@ void DiamondWorker::run(const DiamondInput& input, DiamondOutput& output) {
     simplify.quota = input.quota;
     simplify.shift = shift_;
     simplify.scalar_count = scalar_count_;
-    simplify.droppable_error = input.child_error;
+    simplify.free_error = input.child_error;
     simplifier_.run(simplify, simplified_);
 
     DeviationInput deviation;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 namespace pietra {
 
@@ -48,7 +49,7 @@ bool Collapser::readFirstRing(uint32_t u, uint32_t v) {
 /// Some triangle that dies must be of a cell above its quota. And of two edges that become one, one
 /// must be ordinary with both its triangles in here: then the other's uses are the new edge's.
 bool Collapser::wingsAllow(const Point& u, const Point& v) {
-    bool wanted = false;
+    bool wanted = free_;
     for (uint32_t i = 0; i < wing_count_; ++i) {
         Wing& w = wing_[i];
         wanted |= mesh_.cellAbove(mesh_.face[w.face].cell());
@@ -141,8 +142,11 @@ bool hasArea(const Vec3f& a, const Vec3f& b) {
 /// None of the ring's first `count` triangles may turn by more than acos(0.2), become a sliver or
 /// lose its area when its apex goes to `to`.
 bool Collapser::keepsShapes(uint32_t count, const Vec3f& to) {
-    for (uint32_t pad = ring_.size; pad % kFoldBatch != 0; ++pad)
-        ring_.apex[pad] = ring_.next[pad] = ring_.previous[pad] = 0;  // any valid vertex
+    for (uint32_t pad = ring_.size; pad % kFoldBatch != 0; ++pad) {
+        ring_.apex[pad] = ring_.apex[0];
+        ring_.next[pad] = ring_.next[0];
+        ring_.previous[pad] = ring_.previous[0];
+    }
     for (uint32_t i = 0; i < count; i += kFoldBatch) {
         uint32_t suspects = kernels_.foldingTriangles(mesh_.point.data(), &ring_.apex[i],
                                                       &ring_.next[i], &ring_.previous[i], to);
@@ -165,7 +169,7 @@ bool Collapser::keepsShape(uint32_t i, const Vec3f& to) const {
     const float opposite = glm::dot(n - p, n - p);
     const float new_shape =
         shapeOf(new_sq, glm::dot(new_n, new_n), glm::dot(new_p, new_p), opposite);
-    if (!(new_shape > kMinShape)) {
+    if (!(new_shape > min_shape_)) {
         const float old_shape =
             shapeOf(old_sq, glm::dot(old_n, old_n), glm::dot(old_p, old_p), opposite);
         if (!(new_shape >= old_shape) || !hasArea(new_n, new_p)) return false;
@@ -175,16 +179,27 @@ bool Collapser::keepsShape(uint32_t i, const Vec3f& to) const {
     return turn > 0 && turn * (turn / old_sq) > kMinCosineSq * new_sq;
 }
 
-bool Collapser::tryCollapse(uint32_t u, uint32_t v, const Vec3f& to) {
+bool Collapser::allows(uint32_t u, uint32_t v, const Vec3f& to) {
     if (mesh_.fan[u].count + mesh_.fan[v].count > kMaxRing) return false;
     const Point &pu = mesh_.point[u], &pv = mesh_.point[v];
     if (!readFirstRing(u, v) || !wingsAllow(pu, pv) || !readSecondRing(v, u)) return false;
     if (pv.outer() && makesOuterEdge()) return false;
     if (positions_.occupied(mesh_, to, u, v)) return false;
     const bool v_moves = pv.rank() == pu.rank();
-    if (!keepsShapes(v_moves ? ring_.size : ring_.size_u, to)) return false;
-    apply(u, v, to);
-    return true;
+    return keepsShapes(v_moves ? ring_.size : ring_.size_u, to);
+}
+
+float Collapser::deviation(uint32_t u, uint32_t v, const Vec3f& to) const {
+    float largest = 0;
+    for (const uint32_t end : {u, v}) {
+        float least = HUGE_VALF;
+        for (uint32_t i = 0; i < ring_.size; i += kFoldBatch)
+            least = std::min(
+                least, kernels_.fanDistanceSq(mesh_.point.data(), &ring_.next[i],
+                                              &ring_.previous[i], to, mesh_.point[end].vec()));
+        largest = std::max(largest, std::sqrt(least) + mesh_.quadric[end].deviation);
+    }
+    return largest;
 }
 
 void Collapser::apply(uint32_t u, uint32_t v, const Vec3f& to) {

@@ -44,9 +44,22 @@ public:
     Collapser(WorkingMesh& mesh, PositionSet& positions)
         : mesh_(mesh), positions_(positions), kernels_(chooseEdgeKernels()) {}
 
-    /// Collapses edge (u, v), both alive, to `to`, if all rules allow it. v remains, and must not
-    /// be of lower rank. Merges positions, fans and classes, not quadrics.
-    bool tryCollapse(uint32_t u, uint32_t v, const Vec3f& to);
+    /// True if all rules allow edge (u, v), both alive, to collapse to `to`. v is to remain, and
+    /// must not be of lower rank.
+    bool allows(uint32_t u, uint32_t v, const Vec3f& to);
+
+    /// Of the collapse just allowed: how far what the ends stand for may lie from the triangles
+    /// around the new vertex. An end's old place is measured, what it had before is added.
+    float deviation(uint32_t u, uint32_t v, const Vec3f& to) const;
+
+    /// Performs the collapse just allowed. Merges positions, fans and classes, not quadrics.
+    void apply(uint32_t u, uint32_t v, const Vec3f& to);
+
+    /// If true, triangles of cells that have reached their quotas may die, too.
+    void setFree(bool free) { free_ = free; }
+
+    /// Triangles below this shape, at most kMinShape, must not become worse than they are.
+    void setMinShape(float shape) { min_shape_ = shape; }
 
     /// After a collapse: the triangles around the vertex that remains, with its neighbours.
     const Ring& ring() const { return ring_; }
@@ -59,7 +72,6 @@ private:
     bool makesOuterEdge() const;
     bool keepsShapes(uint32_t count, const Vec3f& to);
     bool keepsShape(uint32_t i, const Vec3f& to) const;
-    void apply(uint32_t u, uint32_t v, const Vec3f& to);
     void setClassOfEdgesTo(uint32_t w, EdgeClass c);
     void writeFan(uint32_t v);
 
@@ -69,6 +81,8 @@ private:
     Ring ring_;
     std::array<Wing, kMaxWings + 1> wing_;
     uint32_t wing_count_ = 0;
+    float min_shape_ = kMinShape;
+    bool free_ = false;
 };
 
 }  // namespace pietra

@@ -3,6 +3,7 @@
 // left that may be.
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include "simplify/attributes.h"
@@ -20,7 +21,8 @@ public:
         : mesh_(mesh), attributes_(attributes) {}
 
     /// Ranks and quadrics of the mesh must be set. `grid`: where new vertices may lie.
-    void run(const SnapGrid& grid);
+    /// `free_error`: as in SimplifyInput.
+    void run(const SnapGrid& grid, float free_error);
 
     /// Of the last run.
     uint32_t collapses() const { return collapses_; }
@@ -37,6 +39,12 @@ private:
 
     bool stillThere(uint32_t u, uint32_t v, uint32_t stamp) const {
         return mesh_.stamp[u] + mesh_.stamp[v] == stamp;
+    }
+    void runRounds(float min_shape);
+    void collapseFreely(float deviation);
+    bool wanted() const { return mesh_.cells_above > 0 || limit_sq_ < HUGE_VALF; }
+    float weightOf(uint32_t u, uint32_t v) const {
+        return mesh_.quadric[u].area + mesh_.quadric[v].area;
     }
     void fillPositions();
     void pushEdge(uint32_t u, uint32_t v);
@@ -59,8 +67,10 @@ private:
     EdgeBatch pending_;  // edges to be evaluated and pushed
     uint32_t pending_count_ = 0;
     Candidates candidates_;
+    uint32_t current_bucket_ = 0;
     uint32_t collapses_ = 0;
     float worst_deviation_sq_ = 0;
+    float limit_sq_ = HUGE_VALF;  // mean squared distance that no collapse may exceed
 };
 
 }  // namespace pietra

@@ -24,9 +24,11 @@ public:
         free_ = kEnd;
     }
 
-    /// `cost` >= 0.
+    /// Grows with `cost` >= 0.
+    static uint32_t bucketOf(float cost) { return std::bit_cast<uint32_t>(cost) >> kShift; }
+
     void push(float cost, const Entry& entry) {
-        const uint32_t bucket = std::bit_cast<uint32_t>(cost) >> kShift;
+        const uint32_t bucket = bucketOf(cost);
         uint32_t& head = head_[bucket];
         if (head == kEnd || chunks_[head].count == kChunkEntries) [[unlikely]]
             addChunk(bucket);

@@ -1,5 +1,6 @@
 #include "simplify/edge_kernels.h"
 
+#include <cmath>
 #include <cstddef>
 
 #undef HWY_TARGET_INCLUDE
@@ -377,6 +378,42 @@ uint32_t foldingTriangles(const Point* points, const uint32_t* apex, const uint3
     return bits;
 }
 
+/// The squared distance of the point `from` + w to the segment from `from` along `edge`.
+template <class D, class V>
+HWY_INLINE V segmentDistanceSq(D d, const V3<V>& w, const V3<V>& edge) {
+    const V tiny = hn::Set(d, 1e-30f), zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+    const V t = hn::Div(dot(w, edge), hn::Max(dot(edge, edge), tiny));
+    const V3<V> off = w - scaled(edge, hn::Max(zero, hn::Min(one, t)));
+    return dot(off, off);
+}
+
+float fanDistanceSq(const Point* points, const uint32_t* next, const uint32_t* previous,
+                    const Vec3f& apex, const Vec3f& point) {
+    using V = hn::Vec<FoldTag>;
+    const FoldTag d;
+    const V3<V> a{hn::Set(d, apex.x), hn::Set(d, apex.y), hn::Set(d, apex.z)};
+    const V3<V> w{hn::Set(d, point.x - apex.x), hn::Set(d, point.y - apex.y),
+                  hn::Set(d, point.z - apex.z)};
+    const V zero = hn::Zero(d);
+    V least = hn::Set(d, HUGE_VALF);
+    for (size_t i = 0; i < kFoldBatch; i += hn::MaxLanes(d)) {
+        const V3<V> ab = positionsOf(d, points, next + i) - a;
+        const V3<V> ac = positionsOf(d, points, previous + i) - a;
+        const V3<V> normal = cross(ab, ac);
+        const V normal_sq = dot(normal, normal), height = dot(w, normal);
+        const V s = dot(cross(w, ac), normal), t = dot(cross(ab, w), normal);
+        const auto inside =
+            hn::And(hn::And(hn::Ge(s, zero), hn::Ge(t, zero)),
+                    hn::And(hn::Le(hn::Add(s, t), normal_sq), hn::Gt(normal_sq, zero)));
+        const V to_edges =
+            hn::Min(hn::Min(segmentDistanceSq(d, w, ab), segmentDistanceSq(d, w, ac)),
+                    segmentDistanceSq(d, w - ab, ac - ab));
+        const V to_plane = hn::Mul(height, hn::Div(height, normal_sq));
+        least = hn::Min(least, hn::IfThenElse(inside, to_plane, to_edges));
+    }
+    return hn::GetLane(hn::MinOfLanes(d, least));
+}
+
 }  // namespace pietra::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -385,10 +422,12 @@ namespace pietra {
 
 HWY_EXPORT(place);
 HWY_EXPORT(foldingTriangles);
+HWY_EXPORT(fanDistanceSq);
 
 EdgeKernels chooseEdgeKernels() {
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    return {&HWY_DYNAMIC_DISPATCH(place), &HWY_DYNAMIC_DISPATCH(foldingTriangles)};
+    return {&HWY_DYNAMIC_DISPATCH(place), &HWY_DYNAMIC_DISPATCH(foldingTriangles),
+            &HWY_DYNAMIC_DISPATCH(fanDistanceSq)};
 }
 
 }  // namespace pietra

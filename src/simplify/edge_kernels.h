@@ -1,7 +1,7 @@
 #pragma once
-// The two inner loops of the simplifier, many at a time, through Highway: where do edges collapse
-// to and at what cost, and which triangles might fold. Equal results on every instruction set:
-// elementwise IEEE operations in one order, no fused multiply-add.
+// The inner loops of the simplifier, many at a time, through Highway: where do edges collapse to
+// and at what cost, which triangles might fold, and how far is a point from them. Equal results on
+// every instruction set: elementwise IEEE operations in one order, no fused multiply-add.
 
 #include <cstdint>
 
@@ -24,7 +24,7 @@ struct SnapGrid {
 /// Edges to evaluate; fill all lanes (repeat one that is there).
 struct alignas(64) EdgeBatch {
     uint32_t u[kBatch], v[kBatch];
-    float cost[kBatch];  ///< the quadrics' value at the place, >= 0
+    float cost[kBatch];                     ///< the quadrics' value at the place, >= 0
     float x[kBatch], y[kBatch], z[kBatch];  ///< on the grid; an end where only that may be
     /// Of the attributes in the quadrics, there.
     float value[kMaxQuadricAttributes][kBatch];
@@ -39,6 +39,9 @@ struct EdgeKernels {
     /// too far or becomes a sliver. Reads eight of each array.
     uint32_t (*foldingTriangles)(const Point* points, const uint32_t* apex, const uint32_t* next,
                                  const uint32_t* previous, const Vec3f& to);
+    /// Squared distance of `point` to the triangles (apex, next, previous), eight of each array.
+    float (*fanDistanceSq)(const Point* points, const uint32_t* next, const uint32_t* previous,
+                           const Vec3f& apex, const Vec3f& point);
 };
 
 /// For the processor at hand.

@@ -3,6 +3,7 @@
 // point `vertex + z` to planes. Centred at its vertex, so b and c vanish at first and float
 // suffices.
 
+#include <algorithm>
 #include <cmath>
 
 #include "geometry/vec.h"
@@ -16,7 +17,8 @@ inline constexpr float kRegulariser = 1e-4f;
 struct alignas(16) Quadric {
     float a00 = 0, a11 = 0, a22 = 0, a01 = 0;
     float a02 = 0, a12 = 0, c = 0, area = 0;
-    float b0 = 0, b1 = 0, b2 = 0, unused = 0;
+    float b0 = 0, b1 = 0, b2 = 0;
+    float deviation = 0;  ///< no part of f: largest distance so far of what the vertex stands for
 
     /// A plane through the vertex, `normal` of unit length, and the regulariser.
     static Quadric ofPlane(const Vec3f& n, float weight) {
@@ -63,7 +65,8 @@ struct alignas(16) Quadric {
 
     void add(const Quadric& q) {
         addMatrix(q);
-        b0 += q.b0, b1 += q.b1, b2 += q.b2, unused += q.unused;
+        b0 += q.b0, b1 += q.b1, b2 += q.b2;
+        deviation = std::max(deviation, q.deviation);
     }
 };
 static_assert(sizeof(Quadric) == 48);

@@ -44,15 +44,15 @@ struct Simplifier::State {
     Fallback fallback;
     std::vector<uint32_t> new_vertex;
 
-    void fallBack(float droppable_error, SimplifyOutput& output);
+    void fallBack(float free_error, SimplifyOutput& output);
     void storeVertices(const Mesh& in, SimplifyOutput& out);
     void storeTriangles(const Mesh& in, SimplifyOutput& out);
 };
 
-void Simplifier::State::fallBack(float droppable_error, SimplifyOutput& output) {
+void Simplifier::State::fallBack(float free_error, SimplifyOutput& output) {
     fallback.allowForLocks(mesh);
     if (mesh.cells_above == 0) return;
-    const float droppable = std::max(droppable_error, output.estimated_error);
+    const float droppable = std::max(free_error, output.estimated_error);
     output.dropped_triangles = fallback.dropComponents(mesh, droppable);
     if (mesh.cells_above == 0) return;
     // Topology holds on to what is left. A little more than asked for is better than harm.
@@ -127,11 +127,11 @@ void Simplifier::run(const SimplifyInput& input, SimplifyOutput& output) {
     s.attributes.load(in, uint32_t(input.scalar_count), input.scalar_range, extentOf(s.mesh));
     output.locked_vertices = s.classifier.run(s.mesh);
     buildQuadrics(s.mesh, s.attributes);
-    s.loop.run(gridOf(s.mesh, input.shift));
+    s.loop.run(gridOf(s.mesh, input.shift), input.free_error);
     output.collapses = s.loop.collapses();
     output.estimated_error = s.loop.worstDeviation();
     output.clustered = output.dropped_triangles = 0;
-    if (s.mesh.cells_above > 0) s.fallBack(input.droppable_error, output);
+    if (s.mesh.cells_above > 0) s.fallBack(input.free_error, output);
     s.storeVertices(in, output);
     s.storeTriangles(in, output);
 }

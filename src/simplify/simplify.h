@@ -17,8 +17,10 @@
 //
 // How: vertices are placed at the quadric's optimum, rounded to the lattice. Collapses are taken
 // from one queue for the diamond, and only while one of the cells they take triangles from is above
-// its quota. Where that gets stuck, small closed-off components are dropped, then vertices are
-// clustered on a growing grid.
+// its quota. A quadric's cost is a mean distance; what states the error is the largest, so
+// collapses that take a vertex far off the surface wait until others cost as much. Where that gets
+// stuck, slivers are allowed, small closed-off components are dropped, then vertices are clustered
+// on a growing grid.
 //
 // Deterministic: equal input gives equal bytes, on every machine. Memory: about 100 bytes a
 // triangle, kept between runs. Time: about 0.2 microseconds an input triangle.
@@ -52,9 +54,11 @@ struct SimplifyInput {
     int shift = 0;
     /// Floats a vertex in mesh->scalar.
     int scalar_count = 0;
-    /// Lattice units: a component without locked vertices whose diameter is below this (or below
-    /// the error reached so far) may be dropped when collapses are stuck, before clustering begins.
-    float droppable_error = 0;
+    /// Lattice units: the error that the output states at least, whatever is done. Collapses go on
+    /// below the quotas where they cost a fraction of it. A component without locked vertices whose
+    /// diameter is below it (or below the error reached so far) may be dropped when collapses are
+    /// stuck, before clustering begins.
+    float free_error = 0;
     /// One a scalar: the width of its range over the whole model, which counts as much as that of a
     /// colour. Empty: its range in this mesh.
     std::span<const float> scalar_range;
