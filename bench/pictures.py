@@ -37,7 +37,7 @@ def compare(model, camera, options, folder):
         common.pietra("render", model, "-o", path / f"{name}.png", "--force", "--camera",
                       path / "camera.json", "--size", f"{width}x{height}", "--pixels", pixels)
     return json.loads(common.pietra("compare", path / "cut.png", path / "full.png", "--json",
-                                    check=False).stdout)
+                                    "--supersampled", options.scale, check=False).stdout)
 
 
 def main():
@@ -57,8 +57,8 @@ def main():
         silhouette, edges, shade, faults = [], [], [], 0
         for camera in cameras(info["bounds"], options.views, options.seed):
             found = compare(model, camera, options, options.folder)
-            silhouette.append(found["coverage_px"]["max"] / options.scale)
-            edges.append(found["edge_px"]["max"] / options.scale)
+            silhouette.append(found["coverage_px"]["max"])
+            edges.append(found["edge_px"]["max"])
             shade.append(found["shade"]["mean"])
             if max(silhouette[-1], edges[-1]) > limit:
                 faults += 1

@@ -249,11 +249,13 @@ void compareCoverage(const Picture& a, const Picture& b, PictureDifference& resu
     result.coverage_px = spreadOf(distances);
 }
 
-void compareEdgesAndDepth(const Picture& a, const Picture& b, PictureDifference& result) {
-    const Mask weak_a = edges(a, kWeakStep), weak_b = edges(b, kWeakStep);
+void compareEdgesAndDepth(const Picture& a, const Picture& b, int supersampled,
+                          PictureDifference& result) {
+    const float weak = kWeakStep * float(supersampled), strong = kStrongStep * float(supersampled);
+    const Mask weak_a = edges(a, weak), weak_b = edges(b, weak);
     std::vector<double> distances;
-    addDistances(edges(a, kStrongStep), weak_b, a.size, distances);
-    addDistances(edges(b, kStrongStep), weak_a, a.size, distances);
+    addDistances(edges(a, strong), weak_b, a.size, distances);
+    addDistances(edges(b, strong), weak_a, a.size, distances);
     result.edge_px = spreadOf(distances);
 
     const Mask skip = surfaceUnknown(weak_a, weak_b, a.size);
@@ -261,6 +263,12 @@ void compareEdgesAndDepth(const Picture& a, const Picture& b, PictureDifference&
     addDepthErrors(a, b, skip, errors);
     addDepthErrors(b, a, skip, errors);
     result.depth_px = spreadOf(errors);
+}
+
+void divide(Spread& spread, double by) {
+    spread.mean /= by;
+    spread.p99 /= by;
+    spread.max /= by;
 }
 
 Spread compareShade(const Picture& a, const Picture& b, bool has_depth) {
@@ -290,7 +298,7 @@ double PictureDifference::largestPx() const {
     return std::max({coverage_px.max, edge_px.max, depth_px.max});
 }
 
-PictureDifference compare(const Picture& a, const Picture& b) {
+PictureDifference compare(const Picture& a, const Picture& b, int supersampled) {
     checkComparable(a, b);
     PictureDifference result;
     result.has_depth = a.hasDepth() && b.hasDepth();
@@ -298,7 +306,9 @@ PictureDifference compare(const Picture& a, const Picture& b) {
     result.shade = compareShade(a, b, result.has_depth);
     if (!result.has_depth) return result;
     compareCoverage(a, b, result);
-    compareEdgesAndDepth(a, b, result);
+    compareEdgesAndDepth(a, b, supersampled, result);
+    for (Spread* spread : {&result.coverage_px, &result.edge_px, &result.depth_px})
+        divide(*spread, supersampled);
     return result;
 }
 

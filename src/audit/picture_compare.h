@@ -57,7 +57,10 @@ struct PictureDifference {
     double largestPx() const;
 };
 
-/// Throws UsageError if the sizes differ, or the focal lengths by more than a millionth.
-PictureDifference compare(const Picture& a, const Picture& b);
+/// `supersampled`: this many pixels of these pictures along each side of the pixels that count, for
+/// distances and steps. With a tolerance of T such pixels, what moves by T to and fro changes a
+/// step by 2 T: edges are comparable up to T = (kStrongStep - kWeakStep) / 2. Throws UsageError if
+/// the sizes differ, or the focal lengths by more than a millionth.
+PictureDifference compare(const Picture& a, const Picture& b, int supersampled = 1);
 
 }  // namespace pietra

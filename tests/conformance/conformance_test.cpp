@@ -13,6 +13,8 @@
 #include "base/error.h"
 #include "methods/method_table.h"
 #include "multires/cut.h"
+#include "render/offline/offline_picture.h"
+#include "runtime/eye_side.h"
 #include "runtime/patch_reader.h"
 #include "store/model_reader.h"
 #include "store/verify.h"
@@ -106,8 +108,8 @@ TEST_P(Conformance, anyValidCutIsCrackFree) {
     for (uint64_t seed = 0; seed < 40; ++seed) {
         const Cut cut = randomCut(model.nodes(), seed);
         sizes.insert(cut.triangles);
-        const CrackReport report = countCracks(streamOf(model), cut.nodes, budget_,
-                                               size_t(16) << 20, scratch_.path());
+        const CrackReport report =
+            countCracks(streamOf(model), cut.nodes, budget_, size_t(16) << 20, scratch_.path());
         EXPECT_TRUE(report.ok()) << "cut " << seed << ": " << report.cracked_edges << " cracked, "
                                  << report.overlapping_edges << " overlapping, "
                                  << report.miscounted_edges << " miscounted, "
@@ -171,13 +173,37 @@ TEST_P(Conformance, statedErrorsHoldAgainstTheFinestCut) {
     const PatchStream stream = streamOf(model);
     CertificateOptions options;
     options.samples = 300'000;
-    const auto reports = auditCertificate(model.nodes(), cuts, stream,
-                                          truthOfFinestCut(model.nodes(), stream), options, budget_);
+    const auto reports = auditCertificate(
+        model.nodes(), cuts, stream, truthOfFinestCut(model.nodes(), stream), options, budget_);
     for (const CertificateReport& report : reports) {
         EXPECT_EQ(report.violations(), 0u) << report.worstRatio();
         EXPECT_GT(report.samples(), 1000u);
     }
     EXPECT_GT(reports[0].worstRatio(), 0.15);  // a bound, but no idle one
+}
+
+TEST_P(Conformance, fromWithinNothingIsCulled) {
+    build("model");
+    const ModelReader model(scratch_.file("model"));
+    const Box3i& box = model.info().bounds;
+    const Vec3d low = model.info().lattice.toInput(box.min),
+                high = model.info().lattice.toInput(box.max);
+    Camera camera;
+    camera.target = high;
+    camera.eye = (low + high) * 0.5;
+    const bool closed = mesh().name == "closed";
+    EXPECT_EQ(eyeMayBeInside(model, View(camera, {64, 64}, model.info().lattice)), closed);
+    Progress progress;
+    const ModelReader* scene[] = {&model};
+    OfflineSettings settings;
+    settings.culling = {true, true, true};
+    const OfflineStatistics drawn =
+        drawModels(scene, camera, {64, 64}, settings, progress).statistics;
+    if (closed) {
+        EXPECT_EQ(drawn.pixels_covered, 64u * 64u);
+    }
+    camera.eye = high + (high - low);
+    EXPECT_FALSE(eyeMayBeInside(model, View(camera, {64, 64}, model.info().lattice)));
 }
 
 TEST_P(Conformance, damageIsFound) {

@@ -39,6 +39,7 @@ private:
     std::string plain(const PictureDifference& difference) const;
 
     std::string a_, b_;
+    int supersampled_ = 1;
     std::optional<double> max_px_, max_shade_;
     bool json_ = false;
 };
@@ -47,10 +48,10 @@ VerbText CompareVerb::text() const {
     return {
         "compare",
         "measure how much two pictures of one view differ",
-        {"A.png B.png [--max-px X] [--max-shade Y] [--json]"},
+        {"A.png B.png [--max-px X] [--max-shade Y] [--supersampled N] [--json]"},
         {"Compares what two pictures cover, where their depth edges lie, how far their surfaces "
-         "are "
-         "apart (in pixels of displacement), and their shades (of 255). Distances need the depth "
+         "are apart (in pixels of displacement), and their shades (of 255). Distances need the "
+         "depth "
          "that `pietra render` writes into its pictures; other PNG files are compared by shade "
          "alone.",
          "With limits, exit status 6 says that a limit is exceeded."},
@@ -65,6 +66,8 @@ void CompareVerb::declare(OptionSet& options) {
                    "Most pixels that coverage, a depth edge or a surface may be displaced by.");
     options.number("--max-shade", "Y", max_shade_, {.min = 0, .max = 255},
                    "Most that the 99th percentile of the shades' differences may be.");
+    options.number("--supersampled", "N", supersampled_, {.min = 1, .max = 64},
+                   "Count distances in pixels of N by N of these pictures'.");
     options.flag("--json", json_, "Print JSON.");
 }
 
@@ -108,7 +111,7 @@ int CompareVerb::run(const RunContext& context) {
     const Picture a = readPicture(a_), b = readPicture(b_);
     if (max_px_ && !(a.hasDepth() && b.hasDepth()))
         throw InputError(a.hasDepth() ? b_ : a_, "", "has no depth, by which --max-px is measured");
-    const PictureDifference difference = compare(a, b);
+    const PictureDifference difference = compare(a, b, supersampled_);
     if (json_)
         printJson(json(difference));
     else

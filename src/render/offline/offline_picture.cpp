@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "render/raster/rasteriser.h"
+#include "runtime/eye_side.h"
 #include "runtime/patch_reader.h"
 
 namespace pietra {
@@ -65,6 +66,9 @@ public:
     OfflinePicture run() {
         const auto start = Clock::now();
         uint64_t patches = 0;
+        for (const SceneModel& model : models_)
+            settings_.shade.two_sided |= eyeMayBeInside(*model.reader, model.view);
+        settings_.culling.cone &= !settings_.shade.two_sided;
         for (SceneModel& model : models_) {
             select(model);
             patches += model.cut.nodes.size();

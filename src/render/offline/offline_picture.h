@@ -24,7 +24,8 @@ struct OfflineSettings {
     Culling culling;  ///< of contribution, only where there is a tolerance
     int samples = 1;  ///< 1 or 4
     /// value_min and value_max are set by drawModels(): Show::kError shows errors in pixels, from 0
-    /// to the tolerance, or to the largest one drawn where there is none.
+    /// to the tolerance, or to the largest one drawn where there is none. From within a closed part
+    /// everything is two-sided (runtime/eye_side.h).
     ShadeSettings shade;
     /// Bound of everything held: node tables, picture, and the patches in flight.
     size_t memory_bytes = size_t(1) << 30;
