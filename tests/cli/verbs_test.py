@@ -215,6 +215,38 @@ class Shown(VerbTest):
         refuse(start + ["--camera", "c.json", "--view", "top"], 2,
                "--camera and --view exclude each other: give one")
 
+    def test_bench_on_every_path(self):
+        for path in ("orbit", "dive", "flight", "jumps"):
+            r = self.report("bench", "statue.pietra", "--path", path, "--frames", "12", "--size",
+                            "160x120", "--report", "-")
+            self.assertEqual(len(r["frames"]), 12)
+            self.assertEqual(r["summary"]["frames"], 12)
+            self.assertGreater(r["summary"]["first_image_ms"], 0)
+            self.assertGreaterEqual(r["summary"]["converged_ms"], 0)
+            self.assertGreater(max(f["triangles"] for f in r["frames"]), 0)
+        undrawn = self.report("bench", "statue.pietra", "--path", "orbit", "--frames", "5",
+                              "--renderer", "none", "--prefetch", "off", "--report", "-")
+        self.assertEqual(undrawn["frames"][0]["draw_ms"], 0)
+        self.assertRefused(["bench", "statue.pietra", "--path", "orbit", "--ram", "1K"], 5,
+                           self.run_pietra("bench", "statue.pietra", "--path", "orbit", "--ram",
+                                           "1K").stderr[len("pietra: "):-1])
+        self.assertRefused(["bench", "statue.pietra", "--path", "none.json"], 4,
+                           "none.json: cannot open: No such file or directory")
+
+    def test_view_does_as_a_script_says(self):
+        self.write("s.txt", "# turn it\nwait\nscreenshot a.png\ndrag left 200 150 300 180\n"
+                   "wheel 3 200 150\nkey 5\nwait\nscreenshot b.png\nquit\n")
+        screen = {"SDL_VIDEODRIVER": "offscreen"}
+        run = self.run_pietra("view", "statue.pietra", "--size", "400x300", "--script", "s.txt",
+                              env=screen)
+        self.assertEqual((run.returncode, run.stdout), (0, ""), run.stderr)
+        moved = self.report("compare", "a.png", "b.png", "--json")
+        self.assertGreater(moved["shade"]["p99"], 20)
+        self.write("bad.txt", "wait\njump\n")
+        run = self.run_pietra("view", "statue.pietra", "--script", "bad.txt", env=screen)
+        self.assertEqual((run.returncode, run.stderr),
+                         (3, "pietra: bad.txt: line 2: 'jump' is no command\n"))
+
     def test_compare_finds_what_has_moved(self):
         for name, x in (("a", 0.0), ("b", 0.0), ("c", 0.05)):
             self.write("c.json", json.dumps({"eye": [x, -5, 0.5], "target": [x, 0, 0],
