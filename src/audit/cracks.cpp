@@ -5,7 +5,7 @@
 #include <mutex>
 #include <vector>
 
-#include "audit/spill_table.h"
+#include "extmem/spill_table.h"
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "geometry/lattice.h"

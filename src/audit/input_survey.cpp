@@ -4,9 +4,9 @@
 #include <mutex>
 #include <tuple>
 
-#include "audit/spill_table.h"
 #include "base/hash.h"
 #include "base/parallel.h"
+#include "extmem/spill_table.h"
 
 namespace pietra {
 
