@@ -83,9 +83,9 @@ TEST(ModelAudit, namesWhatIsWrong) {
     });
     EXPECT_NE(untrue.find(" samples violate the stated error, the first at"), std::string::npos)
         << untrue;
-    EXPECT_EQ(faultOf(true, [&](Case& c) { c.source.triangle_.pop_back(); }),
+    EXPECT_EQ(faultOf(true, [&](Case& c) { c.source.triangles.pop_back(); }),
               "the finest cut is not the input");
-    EXPECT_EQ(faultOf(true, [&](Case& c) { c.source.position_[5].x += 0.03; }),
+    EXPECT_EQ(faultOf(true, [&](Case& c) { c.source.vertices.position[5].x += 0.03; }),
               "the finest cut is not the input");
 }
 
