@@ -9,9 +9,9 @@ set -euo pipefail
 
 declare -A packages=(
     [build]="g++ cmake ninja-build pkg-config python3 libcli11-dev libfmt-dev libglm-dev
-             libgtest-dev libhwy-dev libimgui-dev libmeshoptimizer-dev libpng-dev libsdl2-dev
-             libspdlog-dev libtbb-dev
-             libxxhash-dev libzstd-dev nlohmann-json3-dev zlib1g-dev"
+             libgtest-dev libhwy-dev libimgui-dev liblzma-dev libmeshoptimizer-dev libpng-dev
+             libsdl2-dev libspdlog-dev libtbb-dev libxxhash-dev libzstd-dev nlohmann-json3-dev
+             zlib1g-dev"
     [ci]="ccache clang-14 libclang-rt-14-dev"
     [demo]="ferret-datasets"
 )
