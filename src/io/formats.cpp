@@ -1,6 +1,7 @@
 #include "io/formats.h"
 
 #include "io/ply_source.h"
+#include "io/stl_source.h"
 
 namespace pietra {
 
@@ -8,6 +9,7 @@ namespace {
 
 constexpr MeshFormat kFormats[] = {
     {"PLY", isPly, openPly},
+    {"STL", isStl, openStl},
 };
 
 }  // namespace
