@@ -475,7 +475,7 @@ TEST(PlySource, namesEveryFault) {
     };
     const Case cases[] = {
         {"", "the file is empty"},
-        {"solid", "is of no format that Pietra reads (PLY)"},
+        {"plywood", "is of no format that Pietra reads (PLY, STL, glTF)"},
         {"ply\nformat ascii 1.0\n", "line 3: the header has no end_header"},
         {"ply \n", "line 2: the header has no end_header"},
         {"ply x\n", "is no PLY file: its first line is not \"ply\""},

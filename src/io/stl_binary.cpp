@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cctype>
 #include <cmath>
 #include <cstring>
@@ -44,7 +43,7 @@ public:
     }
 
     StlPlace start() const override { return {.offset = kHeaderBytes}; }
-    uint64_t countHint() const override { return count_; }
+    std::optional<uint64_t> count() const override { return count_; }
 
     size_t read(StlPlace& place, std::span<Vec3f> corners) override {
         const auto wanted = size_t(std::min<uint64_t>(corners.size() / 3, count_ - place.facet));
@@ -88,13 +87,10 @@ private:
         uint32_t attributes = 0;
         bool finite = true;
         for (size_t i = 0; i < corners.size(); i += 3, in += kFacetBytes) {
-            float value[9];
-            std::memcpy(value, in + kNormalBytes, kCornerBytes);
-            for (float& v : value) {
-                finite &= (std::bit_cast<uint32_t>(v) & kExponent) != kExponent;
-                v += 0.0f;  // makes minus zero zero
-            }
-            std::memcpy(&corners[i], value, kCornerBytes);
+            uint32_t bits[9];
+            std::memcpy(bits, in + kNormalBytes, kCornerBytes);
+            for (const uint32_t b : bits) finite &= (b & kExponent) != kExponent;
+            std::memcpy(&corners[i], bits, kCornerBytes);
             uint16_t attribute;
             std::memcpy(&attribute, in + kNormalBytes + kCornerBytes, sizeof attribute);
             attributes += attribute != 0;

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -32,10 +33,10 @@ public:
 
     virtual ~StlFacets() = default;
     virtual StlPlace start() const = 0;
-    /// How many facets there are, or about how many.
-    virtual uint64_t countHint() const = 0;
+    /// How many facets there are, where that is known before they are read.
+    virtual std::optional<uint64_t> count() const = 0;
     /// Reads the facets at `place` and moves it; returns how many: 0 at the end only. `corners`:
-    /// three a facet, counter-clockwise seen from outside; finite, zeros are positive.
+    /// three a facet, counter-clockwise seen from outside; all finite.
     virtual size_t read(StlPlace& place, std::span<Corner> corners) = 0;
     /// As TriangleSource::notes().
     virtual std::vector<std::string> notes() const = 0;

@@ -8,7 +8,6 @@
 
 #include "base/error.h"
 #include "io/stl_facets.h"
-#include "io/vertex_window.h"
 
 namespace pietra {
 
@@ -18,27 +17,17 @@ template <class Real>
 class StlSource : public TriangleSource {
 public:
     StlSource(std::unique_ptr<ByteReader> reader, std::unique_ptr<StlFacets<Real>> facets)
-        : reader_(std::move(reader)), facets_(std::move(facets)) {
-        // A triangle takes some bytes, so a small file needs no large block.
-        const uint64_t most = reader_->source().lengthBound();
-        block_.resize(3 * size_t(std::min<uint64_t>(kBlockFacets, most)));
-        rewindVertices();
-        rewindTriangles();
+        : reader_(std::move(reader)),
+          facets_(std::move(facets)),
+          place_(facets_->start()),
+          facet_count_(facets_->count()) {
+        reader_->release();
     }
 
     const AttributeSchema& schema() const override { return schema_; }
-    uint64_t vertexCount() override {
-        if (!vertex_count_) {
-            Stream stream{facets_->start(), {}};
-            std::vector<uint64_t> index(block_.size());
-            std::vector<Vec3d> fresh(block_.size());
-            while (const size_t corners = readBlock(stream))
-                stream.window.weld({block_.data(), corners}, index.data(), fresh.data());
-        }
-        return *vertex_count_;
-    }
+    uint64_t vertexCount() override { return 3 * facetCount(); }
     uint64_t triangleCountHint() override {
-        return facet_count_ ? *facet_count_ : facets_->countHint();
+        return facet_count_ ? *facet_count_ : reader_->source().storedBytes() / kUsualTextBytes + 1;
     }
     uint64_t inputBytes() const override { return reader_->source().storedBytes(); }
     bool cheapToReread() const override {
@@ -46,78 +35,80 @@ public:
     }
     std::vector<std::string> notes() const override { return facets_->notes(); }
 
-    void rewindVertices() override { rewind(vertices_); }
+    void rewindVertices() override {
+        place_ = facets_->start();
+        reader_->release();
+    }
     bool readVertices(VertexBatch& batch) override;
-    void rewindTriangles() override { rewind(triangles_); }
+    void rewindTriangles() override { triangles_read_ = 0; }
     bool readTriangles(TriangleBatch& batch) override;
 
 private:
     static constexpr size_t kBlockFacets = 2048;
+    static_assert(3 * kBlockFacets <= kMaxBatch);
+    /// About as many bytes as writers spend on a facet of a text.
+    static constexpr uint64_t kUsualTextBytes = 260;
 
-    struct Stream {
-        StlPlace place;
-        VertexWindow<Real> window;
-    };
-
-    void rewind(Stream& stream) {
-        stream.place = facets_->start();
-        stream.window.clear();
-        reader_->release();
-    }
-
-    /// Returns how many corners there are now in block_; none at the end.
-    size_t readBlock(Stream& stream) {
-        const size_t facets = facets_->read(stream.place, block_);
-        if (facets == 0) {
-            if (stream.place.facet == 0)
-                throw InputError(reader_->path(), "", "has no triangles: nothing to show");
-            facet_count_ = stream.place.facet;
-            vertex_count_ = stream.window.vertexCount();
-        }
-        return 3 * facets;
-    }
+    size_t readBlock(StlPlace& place);
+    uint64_t facetCount();
 
     std::unique_ptr<ByteReader> reader_;
     std::unique_ptr<StlFacets<Real>> facets_;
     AttributeSchema schema_;
-    std::optional<uint64_t> facet_count_, vertex_count_;
+    StlPlace place_;  ///< of the vertices read next
+    std::optional<uint64_t> facet_count_;
     std::vector<glm::vec<3, Real>> block_;
-    std::vector<uint64_t> index_;  ///< of its corners, where only the positions are wanted
-    std::vector<Vec3d> fresh_;     ///< its new positions, where only the indices are wanted
-    Stream vertices_, triangles_;
+    uint64_t triangles_read_ = 0;
 };
+
+/// Fills block_; returns how many facets it holds, none at the end.
+template <class Real>
+size_t StlSource<Real>::readBlock(StlPlace& place) {
+    // A triangle takes some bytes, so a small file needs no large block.
+    block_.resize(3 * size_t(std::min<uint64_t>(kBlockFacets, reader_->source().lengthBound())));
+    const size_t facets = facets_->read(place, block_);
+    if (facets == 0) {
+        if (place.facet == 0)
+            throw InputError(reader_->path(), "", "has no triangles: nothing to show");
+        facet_count_ = place.facet;
+    }
+    return facets;
+}
+
+template <class Real>
+uint64_t StlSource<Real>::facetCount() {
+    if (!facet_count_)
+        for (StlPlace place = facets_->start(); readBlock(place) > 0;) continue;
+    return *facet_count_;
+}
 
 template <class Real>
 bool StlSource<Real>::readVertices(VertexBatch& batch) {
-    batch.first = vertices_.window.vertexCount();
+    batch.first = 3 * place_.facet;
+    batch.position.clear();
     batch.normal.clear();
     batch.colour.clear();
     batch.scalar.clear();
-    batch.position.clear();
-    index_.resize(block_.size());
-    while (batch.position.size() + block_.size() <= kMaxBatch) {
-        const size_t corners = readBlock(vertices_), begin = batch.position.size();
+    while (batch.position.size() + 3 * kBlockFacets <= kMaxBatch) {
+        const size_t corners = 3 * readBlock(place_), begin = batch.position.size();
         if (corners == 0) break;
         batch.position.resize(begin + corners);
-        const size_t fresh = vertices_.window.weld({block_.data(), corners}, index_.data(),
-                                                   batch.position.data() + begin);
-        batch.position.resize(begin + fresh);
+        std::copy_n(block_.begin(), corners, batch.position.begin() + ptrdiff_t(begin));
     }
     return !batch.position.empty();
 }
 
 template <class Real>
 bool StlSource<Real>::readTriangles(TriangleBatch& batch) {
-    batch.first = triangles_.place.facet;
-    batch.triangle.clear();
-    fresh_.resize(block_.size());
-    while (batch.triangle.size() + block_.size() / 3 <= kMaxBatch) {
-        const size_t corners = readBlock(triangles_), begin = batch.triangle.size();
-        if (corners == 0) break;
-        batch.triangle.resize(begin + corners / 3);
-        triangles_.window.weld({block_.data(), corners}, batch.triangle[begin].data(),
-                               fresh_.data());
+    batch.first = triangles_read_;
+    const uint64_t end = std::min(triangles_read_ + kMaxBatch, facetCount());
+    batch.triangle.resize(size_t(end - triangles_read_));
+    uint64_t corner = 3 * triangles_read_;
+    for (auto& t : batch.triangle) {
+        t = {corner, corner + 1, corner + 2};
+        corner += 3;
     }
+    triangles_read_ = end;
     return !batch.triangle.empty();
 }
 

@@ -1,8 +1,9 @@
 #pragma once
-// STL files as a TriangleSource (stl_facets.h says what is taken). The format has no vertices:
-// equal corners that lie near each other in the file are welded (vertex_window.h), also across
-// solids. Memory: a window of 1 MiB, 2 MiB (text: 4 MiB) for each stream in use, and the caller's
-// batch.
+// STL files as a TriangleSource (stl_facets.h says what is taken). The format has no vertices: each
+// triangle brings three of its own, and welding is left to the lattice. (A table of the latest
+// positions finds five of six corners again, but takes three times as long as reading, in each of
+// five passes.) Triangles are numbers alone and need no reading. Memory: a window of 1 MiB, some
+// KiB and the caller's batch.
 
 #include <memory>
 #include <span>

@@ -15,9 +15,6 @@ namespace pietra {
 
 namespace {
 
-/// About as many bytes as writers spend on a facet.
-constexpr uint64_t kUsualFacetBytes = 260;
-
 char lowerCase(char c) {
     return c >= 'A' && c <= 'Z' ? char(c + ('a' - 'A')) : c;
 }
@@ -117,12 +114,10 @@ private:
 
 class TextStl : public StlFacets<double> {
 public:
-    explicit TextStl(ByteReader& reader) : words_(reader), reader_(reader) {}
+    explicit TextStl(ByteReader& reader) : words_(reader) {}
 
     StlPlace start() const override { return {}; }
-    uint64_t countHint() const override {
-        return reader_.source().storedBytes() / kUsualFacetBytes + 1;
-    }
+    std::optional<uint64_t> count() const override { return {}; }
 
     size_t read(StlPlace& place, std::span<Vec3d> corners) override {
         words_.seek(place);
@@ -171,7 +166,7 @@ private:
         for (int corner = 0; corner < 3; ++corner) {
             words_.expect("vertex");
             Vec3d& p = corners[corner];
-            for (int k = 0; k < 3; ++k) p[k] = words_.nextReal() + 0.0;  // which has no minus
+            for (int k = 0; k < 3; ++k) p[k] = words_.nextReal();
             if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
                 words_.fail(
                     fmt::format("a corner is at ({}, {}, {}), which is no point", p.x, p.y, p.z));
@@ -181,7 +176,6 @@ private:
     }
 
     WordReader words_;
-    ByteReader& reader_;
 };
 
 }  // namespace
