@@ -1,5 +1,6 @@
 #include "io/formats.h"
 
+#include "io/gltf_source.h"
 #include "io/ply_source.h"
 #include "io/stl_source.h"
 
@@ -10,6 +11,7 @@ namespace {
 constexpr MeshFormat kFormats[] = {
     {"PLY", isPly, openPly},
     {"STL", isStl, openStl},
+    {"glTF", isGltf, openGltf},
 };
 
 }  // namespace
