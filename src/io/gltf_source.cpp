@@ -356,6 +356,8 @@ GlbParts readGlbHead(ByteReader& reader) {
         if (first) {
             parts.json_begin = begin;
             parts.json_end = begin + bytes;
+            // Blanks should fill the chunk up, but some writers take zeros.
+            while (parts.json_end > begin && *need(parts.json_end - 1, 1) == 0) --parts.json_end;
         } else if (type == kDataChunk) {
             parts.data = {begin, bytes};
         }
