@@ -3,7 +3,6 @@
 #include "io/stl_source.h"
 
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <cctype>
 #include <cstring>
@@ -84,20 +83,6 @@ std::string textStl(const Soup& soup, const TextStyle& style = {}) {
     }
     if (style.capitals)
         for (char& c : out) c = char(std::toupper(c));
-    return out;
-}
-
-std::string gzipped(const std::string& text) {
-    std::string out(text.size() + 1000, '\0');
-    z_stream stream{};
-    deflateInit2(&stream, 1, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
-    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
-    stream.avail_in = uInt(text.size());
-    stream.next_out = reinterpret_cast<Bytef*>(out.data());
-    stream.avail_out = uInt(out.size());
-    EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-    out.resize(stream.total_out);
-    deflateEnd(&stream);
     return out;
 }
 
