@@ -214,7 +214,7 @@ void GltfSource::place(const glm::dmat4& matrix, VertexBatch& batch, size_t begi
         if (moved)
             p = Vec3d(matrix[0]) * p.x + Vec3d(matrix[1]) * p.y + Vec3d(matrix[2]) * p.z +
                 Vec3d(matrix[3]);
-        finite &= std::isfinite(p.x) & std::isfinite(p.y) & std::isfinite(p.z);
+        finite = finite && std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
     }
     if (!finite) {
         size_t i = begin;
