@@ -665,6 +665,17 @@ TEST(GltfSource, namesEveryFaultOfTheData) {
     EXPECT_EQ(fault(none.json.dump(), "bad.gltf"),
               "buffers[0].uri: is missing, so its data is nowhere");
 
+    for (size_t more = 0; more < 3; ++more) {  // with each kind of padding
+        Builder padded = plainGrid(Grid{30});
+        padded.data.resize(padded.data.size() + more);
+        Json json = Json::parse(padded.embedded());
+        const size_t size = padded.data.size();
+        json["buffers"][0]["byteLength"] = size + 1;
+        EXPECT_EQ(fault(json.dump(), "bad.gltf"),
+                  "buffers[0].byteLength: counts " + std::to_string(size + 1) +
+                      " bytes, but there are " + std::to_string(size));
+    }
+
     const Builder grid = plainGrid(Grid{30});
     std::string embedded = grid.embedded();
     const size_t at = embedded.find("base64,") + 7 + 5000;
