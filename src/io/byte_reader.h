@@ -24,6 +24,8 @@ public:
     explicit ByteReader(std::unique_ptr<ByteSource> source);
 
     const ByteSource& source() const { return *source_; }
+    /// Gives the source away, for other ways of reading; nothing but the destructor may follow.
+    std::unique_ptr<ByteSource> takeSource() { return std::move(source_); }
     const std::string& path() const { return source_->path(); }
     /// Offset of the cursor from the start of the plain bytes.
     uint64_t offset() const { return base_ + cursor_; }

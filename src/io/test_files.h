@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -99,6 +100,21 @@ inline std::string faultOf(const std::string& path) {
     } catch (const Error& e) {
         return e.what();
     }
+}
+
+/// The bytes of a gzip file that holds `text`.
+inline std::string gzipped(const std::string& text) {
+    std::string out(text.size() + 1000, '\0');
+    z_stream stream{};
+    deflateInit2(&stream, 1, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
+    stream.avail_in = uInt(text.size());
+    stream.next_out = reinterpret_cast<Bytef*>(out.data());
+    stream.avail_out = uInt(out.size());
+    EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+    out.resize(stream.total_out);
+    deflateEnd(&stream);
+    return out;
 }
 
 /// A file of the data for development, which lies beside the checkout or where PIETRA_SHARED says;

@@ -1,0 +1,197 @@
+// Text STL, word by word.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string_view>
+
+#include "base/error.h"
+#include "io/number_parser.h"
+#include "io/stl_facets.h"
+
+namespace pietra {
+
+namespace {
+
+char lowerCase(char c) {
+    return c >= 'A' && c <= 'Z' ? char(c + ('a' - 'A')) : c;
+}
+
+/// Blanks are all characters up to the space: also the zero bytes or ^Z that some files end with.
+bool isBlank(uint8_t c) {
+    return c <= ' ';
+}
+
+/// Words of a text, one after the other, with the line that they stand on.
+class WordReader {
+public:
+    explicit WordReader(ByteReader& reader) : reader_(reader) {}
+
+    void seek(const StlPlace& place) {
+        reader_.seek(place.offset);
+        line_ = place.line;
+    }
+    uint64_t offset() const { return reader_.offset(); }
+    uint64_t line() const { return line_; }
+
+    /// The next word, or "" at the end of the file; good until the next call.
+    std::string_view next() {
+        skipBlanks();
+        const size_t size = std::min(reader_.peek(kLongestWord + 1), kLongestWord + 1);
+        const uint8_t* const word = reader_.data();
+        size_t length = 0;
+        while (length < size && !isBlank(word[length])) ++length;
+        if (length > kLongestWord)
+            fail(fmt::format("a word of more than {} characters", kLongestWord));
+        reader_.advance(length);
+        return {reinterpret_cast<const char*>(word), length};
+    }
+
+    /// Passes over a word that must be `expected` (in lower case).
+    void expect(std::string_view expected) {
+        const std::string_view word = next();
+        if (!isWord(word, expected)) failWord(word, fmt::format("\"{}\"", expected));
+    }
+
+    double nextReal() {
+        const std::string_view word = next();
+        if (word.empty()) failWord(word, "a number");
+        double value = 0;
+        const char* const end = word.data() + word.size();
+        if (parseReal(word.data(), end, value) != end) failWord(word, "a number");
+        return value;
+    }
+
+    void skipLine() {
+        for (size_t size; (size = reader_.peek(1)) > 0; reader_.advance(size)) {
+            const uint8_t* const text = reader_.data();
+            size_t length = 0;
+            while (length < size && text[length] != '\n' && text[length] != '\r') ++length;
+            if (length == size) continue;
+            reader_.advance(length);
+            return;
+        }
+    }
+
+    static bool isWord(std::string_view word, std::string_view expected) {
+        return word.size() == expected.size() &&
+               std::equal(word.begin(), word.end(), expected.begin(),
+                          [](char a, char b) { return lowerCase(a) == b; });
+    }
+
+    [[noreturn]] void fail(const std::string& what) const {
+        throw InputError::atLine(reader_.path(), line_, what);
+    }
+    [[noreturn]] void failWord(std::string_view word, const std::string& expected) const {
+        if (word.empty()) fail(fmt::format("the file ends where {} is expected", expected));
+        std::string shown(word.substr(0, 40));
+        for (char& c : shown)
+            if (c < ' ' || c > '~') c = '?';
+        fail(fmt::format("\"{}\" stands where {} is expected", shown, expected));
+    }
+
+private:
+    static constexpr size_t kLongestWord = 255;
+
+    void skipBlanks() {
+        uint8_t before = 0;
+        for (size_t size; (size = reader_.peek(1)) > 0; reader_.advance(size)) {
+            const uint8_t* const text = reader_.data();
+            for (size_t i = 0; i < size; ++i) {
+                const uint8_t c = text[i];
+                if (!isBlank(c)) return reader_.advance(i);
+                if (c == '\r' || (c == '\n' && before != '\r')) ++line_;
+                before = c;
+            }
+        }
+    }
+
+    ByteReader& reader_;
+    uint64_t line_ = 1;
+};
+
+class TextStl : public StlFacets<double> {
+public:
+    explicit TextStl(ByteReader& reader) : words_(reader) {}
+
+    StlPlace start() const override { return {}; }
+    std::optional<uint64_t> count() const override { return {}; }
+
+    size_t read(StlPlace& place, std::span<Vec3d> corners) override {
+        words_.seek(place);
+        size_t done = 0;
+        while (3 * done + 3 <= corners.size() && nextFacet(place)) {
+            readFacet(&corners[3 * done++]);
+            ++place.facet;
+        }
+        place.offset = words_.offset();
+        place.line = words_.line();
+        return done;
+    }
+
+    std::vector<std::string> notes() const override { return {}; }
+
+private:
+    /// Goes to the next "facet" and over it; false at the end of the last solid.
+    bool nextFacet(StlPlace& place) {
+        for (;;) {
+            std::string_view word = words_.next();
+            if (!place.in_solid) {
+                if (word.empty()) return false;
+                if (place.facet == 0 && word.starts_with("\xef\xbb\xbf")) word.remove_prefix(3);
+                if (!WordReader::isWord(word, "solid")) words_.failWord(word, "\"solid\"");
+                words_.skipLine();
+                place.in_solid = true;
+            } else if (WordReader::isWord(word, "facet")) {
+                return true;
+            } else if (WordReader::isWord(word, "endsolid")) {
+                words_.skipLine();
+                place.in_solid = false;
+            } else if (word.empty()) {
+                words_.fail(
+                    fmt::format("the file ends within a solid, after {} triangles", place.facet));
+            } else {
+                words_.failWord(word, "\"facet\" or \"endsolid\"");
+            }
+        }
+    }
+
+    void readFacet(Vec3d* corners) {
+        words_.expect("normal");
+        for (int k = 0; k < 3; ++k) words_.next();
+        words_.expect("outer");
+        words_.expect("loop");
+        for (int corner = 0; corner < 3; ++corner) {
+            words_.expect("vertex");
+            Vec3d& p = corners[corner];
+            for (int k = 0; k < 3; ++k) p[k] = words_.nextReal();
+            if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+                words_.fail(
+                    fmt::format("a corner is at ({}, {}, {}), which is no point", p.x, p.y, p.z));
+        }
+        words_.expect("endloop");
+        words_.expect("endfacet");
+    }
+
+    WordReader words_;
+};
+
+}  // namespace
+
+bool beginsAsStlText(std::span<const uint8_t> head) {
+    constexpr std::string_view kMark = "\xef\xbb\xbf", kSolid = "solid";
+    std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+    if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
+    while (!text.empty() && isBlank(uint8_t(text.front()))) text.remove_prefix(1);
+    return text.size() >= kSolid.size() &&
+           WordReader::isWord(text.substr(0, kSolid.size()), kSolid) &&
+           (text.size() == kSolid.size() || isBlank(uint8_t(text[kSolid.size()])));
+}
+
+std::unique_ptr<StlFacets<double>> openTextStl(ByteReader& reader) {
+    return std::make_unique<TextStl>(reader);
+}
+
+}  // namespace pietra
