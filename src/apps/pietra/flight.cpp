@@ -35,8 +35,6 @@ public:
         for (int i = 0; i < settings_.frames; ++i) {
             if (settings_.real_time) waitFor(start, timeOf(i));
             record_.frames.push_back(frame(request(i)));
-            if (record_.first_image_ms < 0 && record_.frames.back().tolerance_px <= kFirstImagePx)
-                record_.first_image_ms = msSinceStart();
             progress(i);
         }
         record_.seconds = msSince(start) / 1e3;
@@ -82,6 +80,8 @@ private:
         record.resident_bytes = frame.resident_bytes;
         record.tolerance_px = frame.tolerance_px;
         record.converged = frame.converged;
+        if (record_.first_image_ms < 0 && record.tolerance_px <= kFirstImagePx)
+            record_.first_image_ms = msSinceStart();
         return record;
     }
 
