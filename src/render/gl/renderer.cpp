@@ -1,0 +1,418 @@
+#include "render/gl/renderer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <optional>
+
+#include "base/check.h"
+#include "base/error.h"
+#include "base/text.h"
+#include "render/gl/frame_block.h"
+#include "render/gl/program.h"
+#include "render/gl/targets.h"
+#include "render/gl/upload_ring.h"
+#include "render/raster/projection.h"
+
+namespace pietra {
+namespace {
+
+/// The depth buffer is 1 at a depth of kNearDepth / kDepthRoom: other models of the scene may be on
+/// finer lattices than the first one, by as much.
+constexpr float kDepthRoom = 65536;
+constexpr int kScalarColours = 1024;
+constexpr size_t kLargestRing = size_t(1) << 24;
+
+size_t ringBytes(size_t vram_bytes) {
+    return std::min(vram_bytes / 8, kLargestRing) / 2048 * 2048;
+}
+
+std::string lightDefines() {
+    const auto vector = [](const float(&v)[3]) {
+        return fmt::format("vec3({:.6f}, {:.6f}, {:.6f})", v[0], v[1], v[2]);
+    };
+    return fmt::format(
+        "#define KEY_LIGHT {}\n#define SKY_LIGHT {}\n#define GROUND_LIGHT {}\n"
+        "#define EYE_LIGHT {:.6f}\n#define SHINE {:.6f}\n",
+        vector(kKeyLight), vector(kSkyLight), vector(kGroundLight), kEyeLight, kShine);
+}
+
+GlProgram makeDrawProgram(bool attributes) {
+    return makeProgram(
+        {{GL_VERTEX_SHADER, {"frame_block.glsl", "srgb.glsl", "patch_draw.vert.glsl"}},
+         {GL_FRAGMENT_SHADER, {"frame_block.glsl", "srgb.glsl", "patch_draw.frag.glsl"}}},
+        (attributes ? "#define ATTRIBUTES\n" : "") + lightDefines());
+}
+
+GlTexture makeScalarColours() {
+    GLuint name = 0;
+    glCreateTextures(GL_TEXTURE_1D, 1, &name);
+    GlTexture texture(name);
+    std::vector<Vec3f> colours;
+    for (int i = 0; i < kScalarColours; ++i)
+        colours.push_back(scalarColour(float(i) / (kScalarColours - 1)));
+    glTextureStorage1D(texture, 1, GL_RGBA32F, kScalarColours);
+    glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
+    glTextureSubImage1D(texture, 0, 0, kScalarColours, GL_RGB, GL_FLOAT, colours.data());
+    glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTextureParameteri(texture, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    return texture;
+}
+
+/// Vertex attributes, as patch_draw.vert.glsl numbers them; each has a binding of its own, but the
+/// normal, which lies beside the position.
+enum Attribute : GLuint { kPosition = 0, kNormal = 1, kColour = 2, kScalar = 3 };
+
+GlVertexArray makeVertexArray(GLuint indices) {
+    GLuint name = 0;
+    glCreateVertexArrays(1, &name);
+    GlVertexArray array(name);
+    glVertexArrayAttribIFormat(array, kPosition, 2, GL_UNSIGNED_INT, 0);
+    glVertexArrayAttribIFormat(array, kNormal, 2, GL_SHORT, 8);
+    glVertexArrayAttribFormat(array, kColour, 4, GL_UNSIGNED_BYTE, GL_TRUE, 0);
+    glVertexArrayAttribFormat(array, kScalar, 1, GL_FLOAT, GL_FALSE, 0);
+    for (const GLuint attribute : {kPosition, kNormal, kColour, kScalar})
+        glVertexArrayAttribBinding(array, attribute, attribute == kNormal ? kPosition : attribute);
+    for (const GLuint attribute : {kPosition, kNormal}) glEnableVertexArrayAttrib(array, attribute);
+    glVertexArrayElementBuffer(array, indices);
+    return array;
+}
+
+/// What draws of one call have in common. Kept as one number, to sort by.
+struct DrawGroup {
+    bool culled, wide;
+    VertexLayout layout;
+
+    uint32_t key() const {
+        return uint32_t(culled) | uint32_t(wide) << 1 | uint32_t(layout.colours) << 2 |
+               layout.scalars << 3;
+    }
+};
+
+struct QueuedDraw {
+    uint32_t group;  // DrawGroup::key()
+    uint32_t item;
+    const StoredPage* page;
+    const StoredPatch& patch(const GlItem& i) const { return page->patches[i.patch]; }
+};
+
+}  // namespace
+
+struct GlRenderer::State {
+    ShadeSettings settings;
+    UploadRing ring;
+    PageStore pages;
+    Targets targets;
+    GlProgram plain, with_attributes;
+    GlTexture scalar_colours;
+    GlVertexArray vertex_array;
+    GlQuery timer[2];
+    int current_timer = 0;
+    bool timed[2] = {false, false};
+
+    std::optional<Projection> projection;
+    FrameBlock frame{};
+    float reference = 0;  // of depth, see Targets::finish()
+    double focal_px = 0;
+    bool drawing = false;  // between begin() and finish()
+    uint64_t uploaded_before = 0;
+    GlStatistics statistics;
+    std::vector<QueuedDraw> queue;  // of one draw(), kept for its memory
+
+    State(const PictureSize& size, int samples, size_t vram_bytes);
+    void beginTimer();
+    void readTimer(int which);
+    void setModel(const View& view, const Lattice& lattice);
+    void setState() const;
+    static void leaveState();
+    void enqueue(std::span<const GlItem> items);
+    bool usesAttributes(const VertexLayout& layout) const;
+    void submit(std::span<const GlItem> items, std::span<const QueuedDraw> chunk);
+    void bindGroup(const DrawGroup& group);
+    DrawRecord recordOf(const GlItem& item, const QueuedDraw& draw) const;
+    void finish();
+};
+
+GlRenderer::State::State(const PictureSize& size, int samples, size_t vram_bytes)
+    : ring(ringBytes(vram_bytes)),
+      pages(vram_bytes - ringBytes(vram_bytes), ring),
+      targets(size, samples),
+      plain(makeDrawProgram(false)),
+      with_attributes(makeDrawProgram(true)),
+      scalar_colours(makeScalarColours()),
+      vertex_array(makeVertexArray(pages.buffer())) {
+    GLuint names[2];
+    glGenQueries(2, names);
+    for (int i = 0; i < 2; ++i) timer[i] = GlQuery(names[i]);
+    if (glGetError() == GL_OUT_OF_MEMORY)
+        throw MemoryError(
+            fmt::format("there are no {} of graphics memory", formatBytes(vram_bytes)));
+}
+
+void GlRenderer::State::readTimer(int which) {
+    if (!timed[which]) return;
+    GLint done = 0;
+    glGetQueryObjectiv(timer[which], GL_QUERY_RESULT_AVAILABLE, &done);
+    if (done == 0) return;
+    GLuint64 ns = 0;
+    glGetQueryObjectui64v(timer[which], GL_QUERY_RESULT, &ns);
+    statistics.gpu_ms = double(ns) * 1e-6;
+    timed[which] = false;
+}
+
+void GlRenderer::State::beginTimer() {
+    readTimer(current_timer);
+    current_timer ^= 1;
+    readTimer(current_timer);
+    timed[current_timer] = true;
+    glBeginQuery(GL_TIME_ELAPSED, timer[current_timer]);
+}
+
+void GlRenderer::State::setModel(const View& view, const Lattice& lattice) {
+    CHECK(view.size().width == targets.size().width && view.size().height == targets.size().height);
+    const Projection& p = projection.emplace(view, lattice);
+    frame.right = {p.right, p.offset.x};
+    frame.up = {p.up, p.offset.y};
+    frame.forward = {p.forward, p.offset.z};
+    frame.image_centre = {p.centre_x, p.centre_y};
+    frame.image_scale = p.scale;
+    frame.near_depth = kNearDepth;
+    frame.clip_from_image = {1 / p.centre_x, 1 / p.centre_y};
+    frame.depth_scale = reference * p.inv_step;
+    frame.inv_focal = float(1 / view.focal_px());
+    frame.light = Vec3f(glm::normalize(settings.light_direction));
+    frame.show = int32_t(settings.show);
+    const float range = settings.scalar_max - settings.scalar_min;
+    frame.scalar_range = {settings.scalar_min, range > 0 ? 1 / range : 0};
+    frame.centre = 0.5f * glm::vec2(float(view.size().width), float(view.size().height));
+}
+
+/// All that is drawn needs and that others may have changed.
+void GlRenderer::State::setState() const {
+    targets.bind();
+    glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    glEnable(GL_CLIP_DISTANCE0);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_GREATER);
+    glDepthMask(GL_TRUE);
+    glDepthRangef(0, 1);
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+    for (const GLenum off : {GL_BLEND, GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_PRIMITIVE_RESTART,
+                             GL_PRIMITIVE_RESTART_FIXED_INDEX, GL_RASTERIZER_DISCARD,
+                             GL_SAMPLE_ALPHA_TO_COVERAGE, GL_SAMPLE_MASK, GL_DEPTH_CLAMP})
+        glDisable(off);
+    glEnable(GL_MULTISAMPLE);
+    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+    glFrontFace(GL_CW);  // y is turned down
+    glCullFace(GL_BACK);
+    glBindVertexArray(vertex_array);
+    glBindTextureUnit(kScalarColoursUnit, scalar_colours);
+    glBindSampler(kScalarColoursUnit, 0);
+    glBindBuffer(GL_DRAW_INDIRECT_BUFFER, ring.buffer());
+}
+
+void GlRenderer::State::leaveState() {
+    glClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
+    glDisable(GL_CLIP_DISTANCE0);
+    glDisable(GL_DEPTH_TEST);
+    glDisable(GL_CULL_FACE);
+    glDisable(GL_FRAMEBUFFER_SRGB);
+    glDepthFunc(GL_LESS);
+    glFrontFace(GL_CCW);
+    glBindVertexArray(0);
+    glUseProgram(0);
+}
+
+bool GlRenderer::State::usesAttributes(const VertexLayout& layout) const {
+    switch (settings.show) {
+        case Show::kScalar:
+            return layout.scalars > 0;
+        case Show::kShaded:
+        case Show::kColour:
+            return layout.colours;
+        default:
+            return false;
+    }
+}
+
+void GlRenderer::State::enqueue(std::span<const GlItem> items) {
+    queue.clear();
+    const StoredPage* page = nullptr;
+    for (uint32_t i = 0; i < items.size(); ++i) {
+        const GlItem& item = items[i];
+        if (page == nullptr || !(items[i - 1].key == item.key)) page = pages.find(item.key);
+        CHECK(page != nullptr);
+        CHECK_LT(size_t(item.patch), page->patches.size());
+        if (settings.show == Show::kScalar && page->layout.scalars > 0) {
+            CHECK_EQ(page->layout.scalars, uint32_t(settings.scalar_count));
+            CHECK_LT(settings.scalar_index, settings.scalar_count);
+        }
+        const StoredPatch& patch = page->patches[item.patch];
+        if (patch.indices == 0) continue;
+        const bool culled = item.one_sided && !settings.two_sided;
+        queue.push_back({DrawGroup{culled, patch.wide, page->layout}.key(), i, page});
+        statistics.triangles += patch.indices / 3;
+    }
+    statistics.patches += queue.size();
+    std::sort(queue.begin(), queue.end(), [](const QueuedDraw& a, const QueuedDraw& b) {
+        return a.group != b.group ? a.group < b.group : a.item < b.item;
+    });
+}
+
+DrawRecord GlRenderer::State::recordOf(const GlItem& item, const QueuedDraw& draw) const {
+    const bool both_sides = settings.two_sided || !item.one_sided;
+    return {draw.patch(item).corner - projection->origin, both_sides ? DrawRecord::kBothSides : 0,
+            patchColour(settings, item.id, item.tint, item.value, draw.page->layout.colours),
+            item.id};
+}
+
+void GlRenderer::State::bindGroup(const DrawGroup& group) {
+    const bool attributes = usesAttributes(group.layout);
+    const bool scalar = attributes && settings.show == Show::kScalar;
+    glUseProgram(attributes ? with_attributes : plain);
+    (group.culled ? glEnable : glDisable)(GL_CULL_FACE);
+    const auto bind = [&](GLuint attribute, uint32_t offset) {
+        glVertexArrayVertexBuffer(vertex_array, attribute, pages.buffer(), GLintptr(offset),
+                                  GLsizei(group.layout.stride()));
+    };
+    const auto bindOptional = [&](GLuint attribute, bool used, uint32_t offset) {
+        if (used) bind(attribute, offset);
+        (used ? glEnableVertexArrayAttrib : glDisableVertexArrayAttrib)(vertex_array, attribute);
+    };
+    bind(kPosition, 0);
+    bindOptional(kColour, attributes && !scalar, VertexLayout::kColourOffset);
+    bindOptional(kScalar, scalar,
+                 group.layout.scalarOffset() + 4 * uint32_t(settings.scalar_index));
+}
+
+/// The lists of `chunk` through the ring, and a call for each group in it.
+void GlRenderer::State::submit(std::span<const GlItem> items, std::span<const QueuedDraw> chunk) {
+    const RingSpace block = ring.take(sizeof(FrameBlock), 256);
+    const RingSpace records = ring.take(chunk.size() * sizeof(DrawRecord), 256);
+    const RingSpace commands = ring.take(chunk.size() * sizeof(DrawCommand), 4);
+    std::memcpy(block.memory, &frame, sizeof(frame));
+    for (size_t i = 0; i < chunk.size(); ++i) {
+        const GlItem& item = items[chunk[i].item];
+        const StoredPatch& patch = chunk[i].patch(item);
+        const DrawRecord record = recordOf(item, chunk[i]);
+        const DrawCommand command{patch.indices, 1, patch.first_index, patch.base_vertex,
+                                  uint32_t(i)};
+        std::memcpy(records.memory + i * sizeof(record), &record, sizeof(record));
+        std::memcpy(commands.memory + i * sizeof(command), &command, sizeof(command));
+    }
+    glBindBufferRange(GL_UNIFORM_BUFFER, kFrameBinding, ring.buffer(), block.offset,
+                      sizeof(FrameBlock));
+    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, kDrawsBinding, ring.buffer(), records.offset,
+                      GLsizeiptr(chunk.size() * sizeof(DrawRecord)));
+    for (size_t begin = 0, end = 0; begin < chunk.size(); begin = end) {
+        const QueuedDraw& first = chunk[begin];
+        while (end < chunk.size() && chunk[end].group == first.group) ++end;
+        const bool wide = first.patch(items[first.item]).wide;
+        const bool culled = items[first.item].one_sided && !settings.two_sided;
+        bindGroup({culled, wide, first.page->layout});
+        glMultiDrawElementsIndirect(
+            GL_TRIANGLES, wide ? GL_UNSIGNED_INT : GL_UNSIGNED_SHORT,
+            reinterpret_cast<const void*>(commands.offset + begin * sizeof(DrawCommand)),
+            GLsizei(end - begin), 0);
+    }
+    ring.used();
+}
+
+void GlRenderer::State::finish() {
+    if (!drawing) return;
+    targets.finish(reference, settings.show == Show::kDepth, ring);
+    glEndQuery(GL_TIME_ELAPSED);
+    leaveState();
+    drawing = false;
+}
+
+GlRenderer::GlRenderer(const PictureSize& size, int samples, size_t vram_bytes) {
+    CHECK_LE(kLeastVramBytes, vram_bytes);
+    state_ = std::make_unique<State>(size, samples, vram_bytes);
+}
+
+GlRenderer::~GlRenderer() = default;
+
+bool GlRenderer::upload(PageKey key, std::span<const Mesh> patches) {
+    State& s = *state_;
+    const bool done = s.pages.upload(key, patches);
+    s.statistics.upload_bytes = s.pages.uploadedBytes() - s.uploaded_before;
+    return done;
+}
+
+void GlRenderer::release(PageKey key) {
+    state_->pages.release(key);
+}
+
+bool GlRenderer::holds(PageKey key) const {
+    return state_->pages.find(key) != nullptr;
+}
+
+size_t GlRenderer::uploadRoom() {
+    return state_->ring.room();
+}
+
+size_t GlRenderer::usedBytes() const {
+    return state_->pages.used();
+}
+
+size_t GlRenderer::capacityBytes() const {
+    return state_->pages.capacity();
+}
+
+void GlRenderer::resize(const PictureSize& size) {
+    CHECK(!state_->drawing);
+    state_->targets.resize(size);
+}
+
+void GlRenderer::begin(const View& view, const Lattice& lattice, const ShadeSettings& settings) {
+    State& s = *state_;
+    if (s.drawing) glEndQuery(GL_TIME_ELAPSED);
+    s.settings = settings;
+    s.reference = kNearDepth / kDepthRoom * float(lattice.step);
+    s.focal_px = view.focal_px();
+    s.statistics.triangles = s.statistics.patches = s.statistics.upload_bytes = 0;
+    s.uploaded_before = s.pages.uploadedBytes();
+    s.setModel(view, lattice);
+    s.beginTimer();
+    s.targets.clear(settings);
+    s.drawing = true;
+}
+
+void GlRenderer::setModel(const View& view, const Lattice& lattice) {
+    state_->setModel(view, lattice);
+}
+
+void GlRenderer::draw(std::span<const GlItem> items) {
+    State& s = *state_;
+    CHECK(s.drawing);
+    s.enqueue(items);
+    s.setState();
+    // A chunk's lists, and what aligning them may cost, fit the ring.
+    const size_t chunk = (s.ring.largest() - 1024) / (sizeof(DrawRecord) + sizeof(DrawCommand));
+    const std::span<const QueuedDraw> queue(s.queue);
+    for (size_t begin = 0; begin < queue.size(); begin += chunk)
+        s.submit(items, queue.subspan(begin, std::min(chunk, queue.size() - begin)));
+}
+
+Picture GlRenderer::readPicture() {
+    State& s = *state_;
+    s.finish();
+    Picture picture;
+    s.targets.read(picture);
+    picture.focal_px = s.focal_px;
+    return picture;
+}
+
+void GlRenderer::present() {
+    state_->finish();
+    state_->targets.present();
+}
+
+const GlStatistics& GlRenderer::statistics() const {
+    return state_->statistics;
+}
+
+}  // namespace pietra

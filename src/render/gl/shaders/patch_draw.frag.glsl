@@ -1,0 +1,83 @@
+// A pixel of a patch: the light of raster/shade_kernel.cpp, whose constants come from shading.h as
+// macros. The result is in linear light; the target turns it to sRGB.
+
+centroid in vec3 view_normal;
+flat in uvec4 patch_words;
+#ifdef ATTRIBUTES
+centroid in vec3 vertex_value;
+layout(binding = 0) uniform sampler1D scalar_colours;
+#endif
+
+layout(location = 0) out vec4 colour;
+
+// The low 64 bits of a product; x is the low word.
+uvec2 times(uvec2 a, uvec2 b) {
+    uint high, low;
+    umulExtended(a.x, b.x, high, low);
+    return uvec2(low, high + a.x * b.y + a.y * b.x);
+}
+uvec2 foldedBy(uvec2 a, int bits) {
+    return a ^ uvec2(a.x >> bits | a.y << (32 - bits), a.y >> bits);
+}
+
+// hashColour() of shading.cpp.
+vec3 hashColour(uint patch_id, uint triangle) {
+    uint carry;
+    uvec2 bits = uvec2(uaddCarry(triangle, 0x7f4a7c15u, carry), 0u);
+    bits.y = patch_id + 0x9e3779b9u + carry;
+    bits = times(foldedBy(bits, 30), uvec2(0x1ce4e5b9u, 0xbf58476du));
+    bits = times(foldedBy(bits, 27), uvec2(0x133111ebu, 0x94d049bbu));
+    bits = foldedBy(bits, 31);
+    float hue = float(bits.x & 0xffffu) / 65536.0;
+    float saturation = 0.35 + 0.4 * float(bits.x >> 16 & 0xffu) / 255.0;
+    float value = 0.75 + 0.25 * float(bits.x >> 24) / 255.0;
+    vec3 ramp = clamp(abs(fract(hue + vec3(0.0, 2.0, 1.0) / 3.0) * 6.0 - 3.0) - 1.0, 0.0, 1.0);
+    return linearFromSrgb(value * (1.0 - saturation * (1.0 - ramp)));
+}
+
+vec3 baseColour() {
+    vec3 patch_colour = uintBitsToFloat(patch_words.xyz);
+    if (show == kTriangles) return hashColour(patch_words.x, uint(gl_PrimitiveID));
+#ifdef ATTRIBUTES
+    if (show == kScalar) {
+        int last = textureSize(scalar_colours, 0) - 1;
+        float t = clamp(vertex_value.x, 0.0, 1.0);
+        return textureLod(scalar_colours, (t * last + 0.5) / (last + 1), 0.0).rgb;
+    }
+    return show == kShaded ? patch_colour * vertex_value : vertex_value;
+#else
+    return patch_colour;
+#endif
+}
+
+vec3 lit(vec3 n, vec3 eye, vec3 base) {
+    float key = max(dot(n, light), 0.0);
+    float sky = 0.5 + 0.5 * n.y;
+    float shine = key > 0.0 ? max(dot(n, normalize(eye + light)), 0.0) : 0.0;
+    for (int k = 0; k < 5; ++k) shine *= shine;
+    vec3 received = max(dot(n, eye), 0.0) * EYE_LIGHT + key * KEY_LIGHT + sky * SKY_LIGHT +
+                    (1.0 - sky) * GROUND_LIGHT;
+    return received * base + shine * SHINE;
+}
+
+void main() {
+    // Towards the eye, from the pixel's centre whichever samples are covered.
+    vec2 place = floor(gl_FragCoord.xy) + 0.5 - centre;
+    vec3 eye = normalize(vec3(vec2(-place.x, place.y) * inv_focal, 1.0));
+    vec3 n = view_normal;
+    float square = dot(n, n);
+    n *= square > 0.0 ? inversesqrt(square) : 0.0;
+    // Near a silhouette normals point away from faces that are seen: only a normal that is clearly
+    // wrong is turned round on a front.
+    float limit = gl_FrontFacing ? -0.25 : 0.0;
+    if ((patch_words.w & kBothSides) != 0u && dot(n, eye) < limit) n = -n;
+
+    vec3 result;
+    if (show == kNormals)
+        result = linearFromSrgb(n * 0.5 + 0.5);
+    else if (show == kColour)
+        result = baseColour();
+    else
+        result = lit(n, eye, baseColour());
+    colour = vec4(result, 1.0);
+}
