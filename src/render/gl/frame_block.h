@@ -10,20 +10,19 @@ namespace pietra {
 
 /// Binding points.
 inline constexpr uint32_t kFrameBinding = 0, kFinishBinding = 1;  // uniform blocks
-inline constexpr uint32_t kDrawsBinding = 0, kRangeBinding = 1;   // storage blocks
+inline constexpr uint32_t kDrawsBinding = 0;                      // storage block
 inline constexpr uint32_t kScalarColoursUnit = 0, kColourUnit = 1, kDepthUnit = 2,
-                          kBackgroundUnit = 3;
+                          kBackgroundUnit = 3, kRangeUnit = 4;
 
 struct FrameBlock {
     glm::vec4 right, up, forward;
-    glm::vec2 image_centre;
-    float image_scale, near_depth;
-    glm::vec2 clip_from_image;
+    glm::vec2 clip_from_view;
     float depth_scale, inv_focal;
     Vec3f light;
     int32_t show;
-    glm::vec2 scalar_range;
-    glm::vec2 centre;
+    glm::vec2 centre, scalar_range;
+    float near_depth;
+    float padding[3];
 };
 static_assert(sizeof(FrameBlock) == 112);
 

@@ -38,11 +38,12 @@ std::string lightDefines() {
         vector(kKeyLight), vector(kSkyLight), vector(kGroundLight), kEyeLight, kShine);
 }
 
-GlProgram makeDrawProgram(bool attributes) {
+GlProgram makeDrawProgram(bool attributes, int samples) {
     return makeProgram(
         {{GL_VERTEX_SHADER, {"frame_block.glsl", "srgb.glsl", "patch_draw.vert.glsl"}},
          {GL_FRAGMENT_SHADER, {"frame_block.glsl", "srgb.glsl", "patch_draw.frag.glsl"}}},
-        (attributes ? "#define ATTRIBUTES\n" : "") + lightDefines());
+        fmt::format("{}#define SAMPLES {}\n{}", attributes ? "#define ATTRIBUTES\n" : "", samples,
+                    lightDefines()));
 }
 
 GlTexture makeScalarColours() {
@@ -139,8 +140,8 @@ GlRenderer::State::State(const PictureSize& size, int samples, size_t vram_bytes
     : ring(ringBytes(vram_bytes)),
       pages(vram_bytes - ringBytes(vram_bytes), ring),
       targets(size, samples),
-      plain(makeDrawProgram(false)),
-      with_attributes(makeDrawProgram(true)),
+      plain(makeDrawProgram(false, samples)),
+      with_attributes(makeDrawProgram(true, samples)),
       scalar_colours(makeScalarColours()),
       vertex_array(makeVertexArray(pages.buffer())) {
     GLuint names[2];
@@ -176,10 +177,8 @@ void GlRenderer::State::setModel(const View& view, const Lattice& lattice) {
     frame.right = {p.right, p.offset.x};
     frame.up = {p.up, p.offset.y};
     frame.forward = {p.forward, p.offset.z};
-    frame.image_centre = {p.centre_x, p.centre_y};
-    frame.image_scale = p.scale;
     frame.near_depth = kNearDepth;
-    frame.clip_from_image = {1 / p.centre_x, 1 / p.centre_y};
+    frame.clip_from_view = {p.scale / p.centre_x, -p.scale / p.centre_y};
     frame.depth_scale = reference * p.inv_step;
     frame.inv_focal = float(1 / view.focal_px());
     frame.light = Vec3f(glm::normalize(settings.light_direction));

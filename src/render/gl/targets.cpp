@@ -10,7 +10,7 @@
 namespace pietra {
 namespace {
 
-constexpr GLuint kRangeGroup = 16;  // pixels, of depth_range.comp.glsl
+constexpr int kRangeFactor = 16;  // of a step of depth_range.frag.glsl
 
 GlFramebuffer makeFramebuffer(GLuint depth, std::initializer_list<GLuint> colours) {
     GLuint name = 0;
@@ -38,14 +38,15 @@ Targets::Targets(const PictureSize& size, int samples) : samples_(samples) {
         {{GL_VERTEX_SHADER, {"picture_finish.vert.glsl"}},
          {GL_FRAGMENT_SHADER, {"srgb.glsl", "picture_finish.glsl", "picture_finish.frag.glsl"}}},
         defines);
-    range_program_ = makeProgram(
-        {{GL_COMPUTE_SHADER, {"picture_finish.glsl", "depth_range.comp.glsl"}}}, defines);
+    first_range_program_ =
+        makeProgram({{GL_VERTEX_SHADER, {"picture_finish.vert.glsl"}},
+                     {GL_FRAGMENT_SHADER, {"picture_finish.glsl", "depth_range.frag.glsl"}}},
+                    defines + "#define FIRST\n");
+    range_program_ = makeProgram({{GL_VERTEX_SHADER, {"picture_finish.vert.glsl"}},
+                                  {GL_FRAGMENT_SHADER, {"depth_range.frag.glsl"}}});
     GLuint name = 0;
     glCreateVertexArrays(1, &name);
     no_vertices_ = GlVertexArray(name);
-    glCreateBuffers(1, &name);
-    range_ = GlBuffer(name);
-    glNamedBufferStorage(range_, 8, nullptr, 0);
     resize(size);
 }
 
@@ -68,6 +69,7 @@ void Targets::resize(const PictureSize& size) {
     finished_depth_ = makeTexture(GL_R32F, false);
     drawn_ = makeFramebuffer(depth_, {colour_});
     finished_ = makeFramebuffer(0, {finished_colour_, finished_depth_});
+    makeRangeSteps();
     GLuint name = 0;
     glCreateTextures(GL_TEXTURE_2D, 1, &name);
     background_ = GlTexture(name);
@@ -108,14 +110,31 @@ void Targets::bind() const {
     glEnable(GL_FRAMEBUFFER_SRGB);
 }
 
+void Targets::makeRangeSteps() {
+    range_steps_.clear();
+    PictureSize size = size_;
+    do {
+        size.width = (size.width + kRangeFactor - 1) / kRangeFactor;
+        size.height = (size.height + kRangeFactor - 1) / kRangeFactor;
+        GLuint name = 0;
+        glCreateTextures(GL_TEXTURE_2D, 1, &name);
+        GlTexture texture(name);
+        glTextureStorage2D(texture, 1, GL_RG32F, size.width, size.height);
+        GlFramebuffer frame = makeFramebuffer(0, {texture});
+        range_steps_.push_back({size, std::move(texture), std::move(frame)});
+    } while (size.width > 1 || size.height > 1);
+}
+
+/// Leaves the texture with the result bound.
 void Targets::findDepthRange() const {
-    const GLuint none = 0, all = ~0u;
-    glClearNamedBufferSubData(range_, GL_R32UI, 0, 4, GL_RED_INTEGER, GL_UNSIGNED_INT, &none);
-    glClearNamedBufferSubData(range_, GL_R32UI, 4, 4, GL_RED_INTEGER, GL_UNSIGNED_INT, &all);
-    glUseProgram(range_program_);
-    glDispatchCompute((GLuint(size_.width) + kRangeGroup - 1) / kRangeGroup,
-                      (GLuint(size_.height) + kRangeGroup - 1) / kRangeGroup, 1);
-    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    glUseProgram(first_range_program_);
+    for (const RangeStep& step : range_steps_) {
+        glBindFramebuffer(GL_FRAMEBUFFER, step.frame);
+        glViewport(0, 0, step.size.width, step.size.height);
+        glDrawArrays(GL_TRIANGLES, 0, 3);
+        glBindTextureUnit(kRangeUnit, step.texture);
+        glUseProgram(range_program_);
+    }
 }
 
 void Targets::finish(float reference, bool show_depth, UploadRing& ring) {
@@ -124,20 +143,21 @@ void Targets::finish(float reference, bool show_depth, UploadRing& ring) {
     std::memcpy(space.memory, &block, sizeof(block));
     glBindBufferRange(GL_UNIFORM_BUFFER, kFinishBinding, ring.buffer(), space.offset,
                       sizeof(block));
-    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, kRangeBinding, range_);
     glBindTextureUnit(kColourUnit, colour_);
     glBindTextureUnit(kDepthUnit, depth_);
     glBindTextureUnit(kBackgroundUnit, background_);
-    for (const GLuint unit : {kColourUnit, kDepthUnit, kBackgroundUnit}) glBindSampler(unit, 0);
+    for (const GLuint unit : {kColourUnit, kDepthUnit, kBackgroundUnit, kRangeUnit})
+        glBindSampler(unit, 0);
 
-    glBindFramebuffer(GL_FRAMEBUFFER, finished_);
-    glViewport(0, 0, size_.width, size_.height);
     glEnable(GL_FRAMEBUFFER_SRGB);
     for (const GLenum off : {GL_DEPTH_TEST, GL_CULL_FACE, GL_BLEND, GL_SCISSOR_TEST})
         glDisable(off);
-    if (show_depth) findDepthRange();
-    glUseProgram(finish_program_);
     glBindVertexArray(no_vertices_);
+    glBindTextureUnit(kRangeUnit, 0);
+    if (show_depth) findDepthRange();
+    glBindFramebuffer(GL_FRAMEBUFFER, finished_);
+    glViewport(0, 0, size_.width, size_.height);
+    glUseProgram(finish_program_);
     glDrawArrays(GL_TRIANGLES, 0, 3);
     ring.used();
 }

@@ -2,6 +2,8 @@
 // What is drawn into, and the picture made of it: samples in sRGB with reversed depth, and from
 // them one colour and one depth a pixel. Row 0 is the top row. Needs a current context.
 
+#include <vector>
+
 #include "multires/view.h"
 #include "render/gl/frame_block.h"
 #include "render/gl/program.h"
@@ -29,6 +31,12 @@ public:
     void present() const;
 
 private:
+    struct RangeStep {
+        PictureSize size;
+        GlTexture texture;
+        GlFramebuffer frame;
+    };
+    void makeRangeSteps();
     void findDepthRange() const;
     GlTexture makeTexture(GLenum format, bool multisampled) const;
     void paintBackground(const ShadeSettings& settings);
@@ -37,9 +45,9 @@ private:
     const int samples_;
     GlTexture colour_, depth_, finished_colour_, finished_depth_, background_;
     GlFramebuffer drawn_, finished_;
-    GlBuffer range_;
+    std::vector<RangeStep> range_steps_;
     GlVertexArray no_vertices_;
-    GlProgram finish_program_, range_program_;
+    GlProgram finish_program_, first_range_program_, range_program_;
     bool background_painted_ = false;
     Rgba8 background_top_, background_bottom_;
 };

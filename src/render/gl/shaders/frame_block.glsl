@@ -1,16 +1,14 @@
 // What is the same for all of a draw: FrameBlock of frame_block.h.
 layout(std140, binding = 0) uniform Frame {
     vec4 right, up, forward;  // axes of the view in lattice space; w: of the lattice origin, in view space
-    vec2 image_centre;        // in 1/256 pixel
-    float image_scale;        // focal length in 1/256 pixel
-    float near_depth;         // in lattice units
-    vec2 clip_from_image;     // clip units per 1/256 pixel, y already turned down
+    vec2 clip_from_view;      // what x and y are multiplied by; turns y down
     float depth_scale;        // what the depth buffer holds, times the depth in lattice units
     float inv_focal;          // 1 / pixels
     vec3 light;               // towards the light, in view space, unit length
     int show;                 // the numbers of enum Show
-    vec2 scalar_range;        // lowest value, 1 / range
     vec2 centre;              // of the picture, in pixels
+    vec2 scalar_range;        // lowest value, 1 / range
+    float near_depth;         // in lattice units
 };
 
 const int kShaded = 0, kNormals = 1, kDepth = 2, kTriangles = 5, kColour = 7, kScalar = 8;

@@ -1,14 +1,34 @@
 // A pixel of a patch: the light of raster/shade_kernel.cpp, whose constants come from shading.h as
 // macros. The result is in linear light; the target turns it to sRGB.
 
-centroid in vec3 view_normal;
+in vec3 view_normal;
 flat in uvec4 patch_words;
 #ifdef ATTRIBUTES
-centroid in vec3 vertex_value;
+in vec3 vertex_value;
 layout(binding = 0) uniform sampler1D scalar_colours;
 #endif
 
 layout(location = 0) out vec4 colour;
+
+// Attributes are those of the pixel's centre or, where it is outside the triangle, of about the
+// nearest point inside: on the way to the covered samples. With three samples covered, or two
+// opposite ones, the centre is inside; with one, or two neighbours, the triangle's edge may lie
+// anywhere between.
+#if SAMPLES == 1
+#define AT_PLACE(input) input
+#else
+#define AT_PLACE(input) interpolateAtOffset(input, place_offset)
+vec2 place_offset;
+void findPlace() {
+    const vec2 kSample[4] = vec2[4](vec2(-0.125, -0.375), vec2(0.375, -0.125),
+                                    vec2(-0.375, 0.125), vec2(0.125, 0.375));
+    vec2 sum = vec2(0.0);
+    for (int s = 0; s < 4; ++s)
+        if ((gl_SampleMaskIn[0] >> s & 1) != 0) sum += kSample[s];
+    int count = bitCount(gl_SampleMaskIn[0] & 15);
+    place_offset = sum * (count == 1 ? 0.5 : count == 2 ? 0.2 : 0.0);
+}
+#endif
 
 // The low 64 bits of a product; x is the low word.
 uvec2 times(uvec2 a, uvec2 b) {
@@ -41,10 +61,11 @@ vec3 baseColour() {
 #ifdef ATTRIBUTES
     if (show == kScalar) {
         int last = textureSize(scalar_colours, 0) - 1;
-        float t = clamp(vertex_value.x, 0.0, 1.0);
+        float t = clamp(AT_PLACE(vertex_value).x, 0.0, 1.0);
         return textureLod(scalar_colours, (t * last + 0.5) / (last + 1), 0.0).rgb;
     }
-    return show == kShaded ? patch_colour * vertex_value : vertex_value;
+    vec3 colour_there = max(AT_PLACE(vertex_value), 0.0);
+    return show == kShaded ? patch_colour * colour_there : colour_there;
 #else
     return patch_colour;
 #endif
@@ -64,7 +85,10 @@ void main() {
     // Towards the eye, from the pixel's centre whichever samples are covered.
     vec2 place = floor(gl_FragCoord.xy) + 0.5 - centre;
     vec3 eye = normalize(vec3(vec2(-place.x, place.y) * inv_focal, 1.0));
-    vec3 n = view_normal;
+#if SAMPLES > 1
+    findPlace();
+#endif
+    vec3 n = AT_PLACE(view_normal);
     float square = dot(n, n);
     n *= square > 0.0 ? inversesqrt(square) : 0.0;
     // Near a silhouette normals point away from faces that are seen: only a normal that is clearly

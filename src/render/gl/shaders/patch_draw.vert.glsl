@@ -1,12 +1,13 @@
 // A vertex of a patch. Positions are integers until the camera's integer part has been subtracted,
-// and every operation after that is the CPU renderer's (raster/projection.h), `precise` so that no
-// compiler contracts it: a vertex has one image, bit for bit, in every patch, and the same 1/256 of
-// a pixel as on the CPU. Rounding it here, not in the driver, keeps drivers from disagreeing about
-// halves.
+// and the operations after that are the CPU renderer's (raster/projection.h), `precise` so that no
+// compiler contracts them in one program and not in the other: a vertex has one image, bit for bit,
+// in every patch. Drivers round images to 1/256 pixel or finer, as the CPU does.
 //
-// Row 0 of the picture is row 0 of the target: y is turned down, as the fill rule then is top-left
-// where the driver's is lower-left in OpenGL's own orientation, and no rows are exchanged on the
-// way to the file.
+// note: rounding them here would be exacter still, but it must come after clipping: it moves a point
+// far away by more than what is near the eye can bear.
+//
+// Row 0 of the picture is row 0 of the target: y is turned down, so that the fill rule and the places
+// of the samples are the CPU's, and no rows are exchanged on the way to a file.
 
 layout(location = 0) in uvec2 packed_position;  // 21 bits an axis, from the patch's corner
 layout(location = 1) in ivec2 packed_normal;    // octahedral
@@ -25,10 +26,10 @@ out gl_PerVertex {
     vec4 gl_Position;
     float gl_ClipDistance[1];
 };
-centroid out vec3 view_normal;
+out vec3 view_normal;
 flat out uvec4 patch_words;  // colour, or the id in Show::kTriangles; flags
 #ifdef ATTRIBUTES
-centroid out vec3 vertex_value;  // the colour in linear light, or the scalar's place in its range
+out vec3 vertex_value;  // the colour in linear light, or the scalar's place in its range
 #endif
 
 vec3 unitNormal() {
@@ -48,15 +49,7 @@ void main() {
     precise float y = d.x * up.x + d.y * up.y + d.z * up.z + up.w;
     precise float z = d.x * forward.x + d.y * forward.y + d.z * forward.z + forward.w;
 
-    // Relative to the centre, in 1/256 pixel; only what is in front has an image to be rounded.
-    precise vec2 image = vec2(x, -y) * image_scale;
-    if (z >= near_depth) {
-        precise float inverse = 1.0 / z;
-        precise vec2 place = image_centre + image * inverse;
-        if (all(lessThan(abs(place), vec2(8388608.0))))
-            image = (roundEven(place) - image_centre) * z;
-    }
-    gl_Position = vec4(image * clip_from_image, depth_scale, z);
+    gl_Position = vec4(x * clip_from_view.x, y * clip_from_view.y, depth_scale, z);
     gl_ClipDistance[0] = z - near_depth;
 
     vec3 n = unitNormal();

@@ -1,16 +1,10 @@
-// What the two finishing shaders share: the drawn samples, SAMPLES of a pixel, and what the depth
+// What the finishing shaders share: the drawn samples, SAMPLES of a pixel, and what the depth
 // buffer means: FinishBlock of frame_block.h.
 layout(std140, binding = 1) uniform Finish {
     float reference;  // depth in input units times what the depth buffer holds; which is 0 where nothing is
     int show_depth;
     ivec2 size;
 };
-// Bits of the largest and smallest non-zero values of the depth buffer; floats above zero order as
-// their bits do.
-layout(std430, binding = 1) buffer Range {
-    uint nearest_bits, farthest_bits;
-};
-
 #if SAMPLES == 1
 layout(binding = 1) uniform sampler2D drawn_colour;
 layout(binding = 2) uniform sampler2D drawn_depth;
