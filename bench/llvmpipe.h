@@ -7,7 +7,7 @@
 
 #include "geometry/lattice.h"
 #include "multires/view.h"
-#include "render/draw_list.h"
+#include "multires/draw_list.h"
 
 namespace pietra {
 

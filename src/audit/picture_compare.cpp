@@ -35,14 +35,19 @@ public:
                 (float(y) + 0.5f - 0.5f * float(height())) / focal(), 1};
     }
 
-    /// Whether pixel (x, y) hides what its neighbour in direction (dx, dy) shows, by a step of more
+    /// Whether pixel (x, y) is nearer than its neighbour in direction (dx, dy) by a step of more
     /// than `step_px`. The neighbour is in the picture.
-    bool hides(int x, int y, int dx, int dy, float step_px) const {
+    bool steps(int x, int y, int dx, int dy, float step_px) const {
         const float z = (*this)(x, y), neighbour = (*this)(x + dx, y + dy);
-        if (z == kNothing || !(neighbour > z)) return false;
+        return z != kNothing && neighbour - z > step_px * z / focal();
+    }
+
+    /// The same, against the straight continuations too: it hides what the neighbour shows.
+    bool hides(int x, int y, int dx, int dy, float step_px) const {
+        if (!steps(x, y, dx, dy, step_px)) return false;
+        const float z = (*this)(x, y), neighbour = (*this)(x + dx, y + dy);
         if (neighbour == kNothing) return true;
         const float limit = step_px * z / focal();
-        if (neighbour - z <= limit) return false;
         // On a plane 1 / depth is linear in the picture: continue the near surface to the
         // neighbour and the far one to the pixel.
         const float before = (*this)(x - dx, y - dy), after = (*this)(x + 2 * dx, y + 2 * dy);
@@ -76,14 +81,18 @@ Mask coverage(const Picture& picture) {
     return mask;
 }
 
-Mask edges(const Picture& picture, float step_px) {
+using EdgeTest = bool (DepthField::*)(int x, int y, int dx, int dy, float step_px) const;
+
+/// Pixels with such an edge to one of their neighbours.
+Mask edges(const Picture& picture, EdgeTest test, float step_px) {
     const DepthField depth(picture);
     Mask mask(picture.pixelCount());
     forEachRow(picture.size, [&](int y) {
         for (int x = 0; x < picture.size.width; ++x) {
             bool edge = false;
             for (const auto [dx, dy] : {std::array{1, 0}, {-1, 0}, {0, 1}, {0, -1}})
-                edge = edge || (depth.inside(x + dx, y + dy) && depth.hides(x, y, dx, dy, step_px));
+                edge =
+                    edge || (depth.inside(x + dx, y + dy) && (depth.*test)(x, y, dx, dy, step_px));
             mask[picture.index(x, y)] = edge;
         }
     });
@@ -252,13 +261,13 @@ void compareCoverage(const Picture& a, const Picture& b, PictureDifference& resu
 void compareEdgesAndDepth(const Picture& a, const Picture& b, int supersampled,
                           PictureDifference& result) {
     const float weak = kWeakStep * float(supersampled), strong = kStrongStep * float(supersampled);
-    const Mask weak_a = edges(a, weak), weak_b = edges(b, weak);
+    const auto hides = &DepthField::hides, steps = &DepthField::steps;
     std::vector<double> distances;
-    addDistances(edges(a, strong), weak_b, a.size, distances);
-    addDistances(edges(b, strong), weak_a, a.size, distances);
+    addDistances(edges(a, hides, strong), edges(b, steps, weak), a.size, distances);
+    addDistances(edges(b, hides, strong), edges(a, steps, weak), a.size, distances);
     result.edge_px = spreadOf(distances);
 
-    const Mask skip = surfaceUnknown(weak_a, weak_b, a.size);
+    const Mask skip = surfaceUnknown(edges(a, hides, weak), edges(b, hides, weak), a.size);
     std::vector<float> errors;
     addDepthErrors(a, b, skip, errors);
     addDepthErrors(b, a, skip, errors);

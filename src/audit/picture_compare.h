@@ -12,8 +12,8 @@
 // - Depth edges: a pixel that hides what lies behind its right, left, upper or lower neighbour. The
 //   neighbour is not covered, or farther by more than `step` pixels (times depth / focal length),
 //   also against both straight continuations of the surfaces, in 1 / depth, where these have two
-//   pixels in line. Edges of one picture with a step over kStrongStep are sought among those of the
-//   other over kWeakStep, so that none is lost for lying at the limit.
+//   pixels in line. Edges of one picture with a step over kStrongStep are sought among the steps of
+//   the other over kWeakStep, continued or not, so that none is lost for lying at the limit.
 // - Depth: for each pixel covered in both how far its point lies from the other's surface, in
 // pixels
 //   (length * focal / depth). The surface is the points of the pixels in a window of

@@ -6,7 +6,7 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
-#include "coarsen/precision.h"
+#include "coarsen/triangle_ahead.h"
 
 namespace pietra {
 
@@ -147,11 +147,10 @@ Partition::Partition(TriangleSource& source, const VertexTable& vertices,
     progress.beginStage("partition", source.triangleCountHint());
     {
         Dealer dealer(*this, 0, bucketLevel(source.triangleCountHint()), settings.buffer_bytes);
-        TriangleBatch rest;
         std::vector<std::array<uint64_t, 3>> index;
         std::vector<std::byte> corners;
-        source.rewindTriangles();
-        while (readTriangles(source, settings.batch_triangles, rest, index)) {
+        TriangleAhead triangles(source, settings.batch_triangles);
+        while (triangles.next(index)) {
             vertices.gather(index, corners);
             dealer.deal(corners, false, own_bytes_, 0);
             triangles_ += index.size();

@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "base/parallel.h"
+#include "coarsen/triangle_ahead.h"
 
 namespace pietra {
 
@@ -61,30 +62,15 @@ double medianEdge(const std::vector<uint64_t>& bins) {
 
 }  // namespace
 
-bool readTriangles(TriangleSource& source, size_t count, TriangleBatch& rest,
-                   std::vector<std::array<uint64_t, 3>>& index) {
-    index.assign(rest.triangle.begin(), rest.triangle.end());
-    rest.triangle.clear();
-    TriangleBatch batch;
-    while (index.size() < count && source.readTriangles(batch))
-        index.insert(index.end(), batch.triangle.begin(), batch.triangle.end());
-    if (index.size() > count) {
-        rest.triangle.assign(index.begin() + ptrdiff_t(count), index.end());
-        index.resize(count);
-    }
-    return !index.empty();
-}
-
 int chooseShift(TriangleSource& source, const VertexTable& vertices, size_t batch_triangles,
                 Progress& progress) {
     progress.beginStage("measure edges", source.triangleCountHint());
     Statistics total;
     std::mutex mutex;
-    TriangleBatch rest;
     std::vector<std::array<uint64_t, 3>> index;
     std::vector<std::byte> corners;
-    source.rewindTriangles();
-    while (readTriangles(source, batch_triangles, rest, index)) {
+    TriangleAhead triangles(source, batch_triangles);
+    while (triangles.next(index)) {
         vertices.gather(index, corners, true);
         parallelForSlices(index.size(), 65536, [&](size_t begin, size_t end) {
             Statistics part;

@@ -13,9 +13,4 @@ namespace pietra {
 int chooseShift(TriangleSource& source, const VertexTable& vertices, size_t batch_triangles,
                 Progress& progress);
 
-/// Reads up to `count` triangles into `index` (which is overwritten); false when there are none
-/// left. `rest` carries what a batch had too much to the next call.
-bool readTriangles(TriangleSource& source, size_t count, TriangleBatch& rest,
-                   std::vector<std::array<uint64_t, 3>>& index);
-
 }  // namespace pietra

@@ -76,17 +76,6 @@ bool tooSmall(const Sphere& sphere, const View& view, double pixels) {
     return sphere.radius >= 0 && view.errorInPixels(2 * sphere.radius, sphere) <= pixels / 2;
 }
 
-bool branchInvisible(const Node& node, const View& view, double pixels, const Culling& culling) {
-    return (culling.frustum && view.outside(node.saturated)) ||
-           (culling.contribution && tooSmall(node.saturated, view, pixels));
-}
-
-bool patchInvisible(const Node& node, const View& view, double pixels, const Culling& culling) {
-    return (culling.frustum && view.outside(node.bounds)) ||
-           (culling.contribution && tooSmall(node.bounds, view, pixels)) ||
-           (culling.cone && node.closed && view.facesAway(node.cone, node.bounds));
-}
-
 /// Random numbers that are the same everywhere, unlike the standard library's distributions.
 class Dice {
 public:
@@ -139,6 +128,17 @@ Cut randomGroupsCut(std::span<const Node> nodes, Dice& dice) {
 }
 
 }  // namespace
+
+bool branchInvisible(const Node& node, const View& view, double pixels, const Culling& culling) {
+    return (culling.frustum && view.outside(node.saturated)) ||
+           (culling.contribution && tooSmall(node.saturated, view, pixels));
+}
+
+bool patchInvisible(const Node& node, const View& view, double pixels, const Culling& culling) {
+    return (culling.frustum && view.outside(node.bounds)) ||
+           (culling.contribution && tooSmall(node.bounds, view, pixels)) ||
+           (culling.cone && node.closed && view.facesAway(node.cone, node.bounds));
+}
 
 Cut rootCut(std::span<const Node> nodes) {
     return cutWhere(nodes, [](NodeIndex) { return false; });

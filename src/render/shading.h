@@ -8,7 +8,7 @@
 
 #include "geometry/mesh.h"
 #include "geometry/vec.h"
-#include "render/draw_list.h"
+#include "multires/draw_list.h"
 
 namespace pietra {
 

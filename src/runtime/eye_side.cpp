@@ -11,8 +11,6 @@ namespace pietra {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-/// Tolerance of the cut that is looked at, in pixels: coarse, but whole near the eye.
-constexpr double kCoarsePixels = 64;
 /// What rounding and parts of components that are not marked as closed may leave.
 constexpr double kMostOutside = 0.05;
 
@@ -32,31 +30,39 @@ bool maybeWithin(const Vec3d& a, const Vec3d& b, const Vec3d& c, double distance
 
 }  // namespace
 
-bool eyeMayBeInside(const ModelReader& model, const View& view) {
-    std::vector<NodeIndex> closed;
-    for (const NodeIndex i : cutByView(model.nodes(), view, kCoarsePixels).nodes) {
-        const Node& node = model.nodes()[i];
-        if (node.closed && node.triangles > 0) closed.push_back(i);
+void EyeSide::add(const Node& node, const Mesh& patch) {
+    if (!node.closed) return;
+    double half_angle = 0;
+    for (const Triangle& t : patch.triangle) {
+        const Vec3d a = Vec3d(patch.position[t[0]]) - eye_;
+        const Vec3d b = Vec3d(patch.position[t[1]]) - eye_;
+        const Vec3d c = Vec3d(patch.position[t[2]]) - eye_;
+        half_angle += halfSolidAngle(a, b, c);
+        near_ |= maybeWithin(a, b, c, node.error);
     }
-    double winding = 0;
-    bool near = false;
+    winding_ += half_angle / (2 * kPi);
+}
+
+void EyeSide::add(const EyeSide& others) {
+    winding_ += others.winding_;
+    near_ |= others.near_;
+}
+
+bool EyeSide::mayBeInside() const {
+    return near_ || std::abs(winding_) > kMostOutside;
+}
+
+bool eyeMayBeInside(const ModelReader& model, const View& view) {
+    EyeSide side(view.eye());
     std::mutex mutex;
-    visitPatches(model, closed, [&](NodeIndex i, const Mesh& mesh) {
-        const Node& node = model.nodes()[i];
-        double sum = 0;
-        bool near_here = false;
-        for (const Triangle& t : mesh.triangle) {
-            const Vec3d a = Vec3d(mesh.position[t[0]]) - view.eye();
-            const Vec3d b = Vec3d(mesh.position[t[1]]) - view.eye();
-            const Vec3d c = Vec3d(mesh.position[t[2]]) - view.eye();
-            sum += halfSolidAngle(a, b, c);
-            near_here |= maybeWithin(a, b, c, node.error);
-        }
+    const Cut cut = cutByView(model.nodes(), view, kEyeSidePixels);
+    visitPatches(model, cut.nodes, [&](NodeIndex i, const Mesh& mesh) {
+        EyeSide part(view.eye());
+        part.add(model.nodes()[i], mesh);
         const std::lock_guard lock(mutex);
-        winding += sum / (2 * kPi);
-        near |= near_here;
+        side.add(part);
     });
-    return near || std::abs(winding) > kMostOutside;
+    return side.mayBeInside();
 }
 
 }  // namespace pietra

@@ -7,9 +7,27 @@
 
 namespace pietra {
 
-/// True unless the eye is certainly outside of all closed parts: by the winding number (van
-/// Oosterom, Strackee 1983) of a cut that is coarse but near the eye, and no nearer to it than its
-/// error. Reads some pages; throws what that throws. Linear in the cut's triangles.
+/// Sums up the patches of a valid cut, whose nodes may come in any order. Only closed ones count.
+class EyeSide {
+public:
+    explicit EyeSide(const Vec3d& eye) : eye_(eye) {}
+    void add(const Node& node, const Mesh& patch);
+    void add(const EyeSide& others);
+
+    /// True unless the eye is certainly outside: by the winding number (van Oosterom, Strackee
+    /// 1983), and no nearer to a triangle than the error stated.
+    bool mayBeInside() const;
+
+private:
+    Vec3d eye_;
+    double winding_ = 0;
+    bool near_ = false;
+};
+
+/// Of such a cut that is coarse but whole near the eye, and so decides the matter in few triangles.
+inline constexpr double kEyeSidePixels = 64;
+
+/// Of a model on disk. Reads some pages; throws what that throws.
 bool eyeMayBeInside(const ModelReader& model, const View& view);
 
 }  // namespace pietra

@@ -1,6 +1,7 @@
 #include "simplify/deviation_field.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace pietra::deviation {
@@ -58,8 +59,8 @@ struct FieldCover::Crossing {
         const Lanes4 enters = maskLanes(a < 0, t), leaves = maskLanes(b < 0, 1.0f - t);
         const Lanes4 part = maxOfPoints(enters, leaves);
         const float in = a[0] + part[0] * along[0], out = b[0] - part[1] * along[0];
-        const IntLanes4 keep = -IntLanes4{int32_t(meets), 0, 0, 0};
-        height = maskLanes(keep, Lanes4{std::max(std::abs(in), std::abs(out)), 0, 0, 0})[0];
+        const float largest = std::max(std::abs(in), std::abs(out));
+        height = std::bit_cast<float>(std::bit_cast<uint32_t>(largest) & (0u - meets));
     }
 };
 
@@ -156,7 +157,8 @@ bool FieldCover::findStart(uint32_t& at) const {
 }
 
 // `corner`: one of the face's, relative; `corners`: of T within the face, where its plane counts.
-inline void FieldCover::addHit(uint32_t f, Lanes4 corner, float height, uint32_t corners) {
+inline FieldCover::Hit FieldCover::makeHit(uint32_t f, Lanes4 corner, float height,
+                                           uint32_t corners) const {
     const Lanes4 normal = loadLanes(target_->face(f).area_normal.data());
     const Lanes4 along =
         chart_.corner_x * broadcast<1>(normal) +
@@ -164,51 +166,48 @@ inline void FieldCover::addHit(uint32_t f, Lanes4 corner, float height, uint32_t
     const Lanes4 level = broadcast<1>(sumOfPoint(corner * normal));
     const Lanes4 above = maskLanes(lanesOf(corners), absLanes(along - level));
     const float cosine = along[0];
-    hits_[hit_count_++] = {f, std::max(height, maxOfPoint(above)[1] / cosine), cosine};
-}
-
-// If T meets the edge from a to b, the face across it is queued.
-inline void FieldCover::enter(const Crossing& crossing, Lanes4 a, Lanes4 b, HalfEdge opposite) {
-    const uint32_t face = std::min(opposite.face(), target_->faceCount());
-    Entry& entry = queue_[queued_];
-    entry.a = b;
-    entry.b = a;
-    entry.face = face;
-    entry.edge = opposite.edge();
-    entry.beyond = crossing.left;
-    entry.height = crossing.height;
-    entry.centre = -crossing.centre;
-    uint32_t& mark = visited_[face];
-    queued_ += crossing.meets & uint32_t(mark != run_);
-    mark = crossing.meets ? run_ : mark;
+    return {f, std::max(height, maxOfPoint(above)[1] / cosine), cosine};
 }
 
 bool FieldCover::flood(uint32_t start, bool& centre_met) {
-    ++run_;
-    hit_count_ = queued_ = 0;
+    const uint32_t run = ++run_, no_face = target_->faceCount();
+    uint32_t* const visited = visited_.data();
+    Entry* const queue = queue_.get();
+    uint32_t queued = 0, hits = 0;
+    // If T meets the edge from a to b, the face across it is queued.
+    const auto enter = [&](const Crossing& crossing, Lanes4 a, Lanes4 b, HalfEdge opposite) {
+        const uint32_t face = std::min(opposite.face(), no_face);
+        Entry& entry = queue[queued];
+        entry.a = b;
+        entry.b = a;
+        entry.face = face;
+        entry.edge = opposite.edge();
+        entry.beyond = crossing.left;
+        entry.height = crossing.height;
+        entry.centre = -crossing.centre;
+        const uint32_t mark = visited[face];
+        queued += crossing.meets & uint32_t(mark != run);
+        visited[face] = mark ^ ((mark ^ run) & (0u - crossing.meets));
+    };
+
     // The first face is entered by its own first edge, whose other side is queued if T meets it.
     const Surface::Face& first = target_->face(start);
     const Lanes4 w0 = relative(first.vertex[0]), w1 = relative(first.vertex[1]);
     const Lanes4 first_a = see(w0), first_b = see(w1);
     const Crossing first_edge(first_a, first_b);
     Lanes4 extent = maxLanes(absLanes(w0), absLanes(w1));
-    visited_[start] = run_;
-    Entry& own = queue_[queued_++];
-    own.a = first_a;
-    own.b = first_b;
-    own.face = start;
-    own.edge = 0;
-    own.beyond = first_edge.right;
-    own.height = first_edge.height;
-    own.centre = first_edge.centre;
+    visited[start] = run;
+    queue[queued++] = {first_a,           first_b,          start, 0, first_edge.right,
+                       first_edge.height, first_edge.centre};
     enter(first_edge, first_a, first_b, first.opposite[0]);
 
     // First in, first out: so the processor can begin with the next while this one is being
     // decided.
-    for (uint32_t next = 0; next < queued_; ++next) {
-        const Entry& entry = queue_[next];
+    bool centre = false;
+    for (uint32_t next = 0; next < queued; ++next) {
+        const Entry& entry = queue[next];
         const uint32_t f = entry.face;
-        if (f == target_->faceCount() || hit_count_ == kMaxHits) return false;
+        if (f == no_face || hits == kMaxHits) return false;
         const Surface::Face& face = target_->face(f);
         const uint32_t k1 = nextCorner(entry.edge), k2 = nextCorner(k1);
         const Lanes4 w = relative(face.vertex[k2]);
@@ -217,12 +216,16 @@ bool FieldCover::flood(uint32_t start, bool& centre_met) {
         const Crossing leave1(entry.b, c), leave2(c, entry.a);
         const float height = std::max(std::max(entry.height, leave1.height), leave2.height);
         const uint32_t corners = kPointBits & ~(entry.beyond | leave1.right | leave2.right);
-        addHit(f, w, height, corners);
-        if (!(hits_[hit_count_ - 1].cosine > kMinCosine)) return false;
-        centre_met |= std::min(std::min(entry.centre, leave1.centre), leave2.centre) >= 0;
+        const Hit hit = makeHit(f, w, height, corners);
+        hits_[hits++] = hit;
+        if (!(hit.cosine > kMinCosine)) return false;
+        centre |= std::min(std::min(entry.centre, leave1.centre), leave2.centre) >= 0;
+        const Lanes4 a = entry.a;
         enter(leave1, entry.b, c, face.opposite[k1]);
-        enter(leave2, c, entry.a, face.opposite[k2]);
+        enter(leave2, c, a, face.opposite[k2]);
     }
+    hit_count_ = hits;
+    centre_met |= centre;
     slack_ = slackOf(extent);
     return slack_ >= 0;
 }

@@ -77,8 +77,7 @@ private:
     Lanes4 see(Lanes4 relative) const;
     bool findStart(uint32_t& face) const;
     bool flood(uint32_t start, bool& centre_met);
-    void enter(const Crossing& crossing, Lanes4 a, Lanes4 b, HalfEdge opposite);
-    void addHit(uint32_t f, Lanes4 corner, float height, uint32_t corners);
+    Hit makeHit(uint32_t f, Lanes4 corner, float height, uint32_t corners) const;
     float slackOf(Lanes4 extent) const;
 
     const Surface* target_ = nullptr;
@@ -86,7 +85,6 @@ private:
     std::array<Hit, kMaxHits> hits_;
     uint32_t hit_count_ = 0;
     std::unique_ptr<Entry[]> queue_;
-    uint32_t queued_ = 0;
     std::vector<uint32_t> visited_;  ///< per target face, and for none: the last run that met it
     uint32_t run_ = 0;
     float slack_ = 0;

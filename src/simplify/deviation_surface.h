@@ -27,7 +27,7 @@ struct HalfEdge {
 };
 
 inline constexpr uint32_t nextCorner(uint32_t k) {
-    return k == 2 ? 0 : k + 1;
+    return 9u >> (2 * k) & 3;  // 1, 2, 0 without a branch
 }
 
 class Surface {

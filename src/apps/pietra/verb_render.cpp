@@ -11,13 +11,13 @@
 #include "apps/pietra/json_report.h"
 #include "apps/pietra/limits.h"
 #include "apps/pietra/logging.h"
-#include "apps/pietra/scene.h"
+#include "apps/pietra/model_files.h"
 #include "apps/pietra/verbs.h"
 #include "base/budget.h"
 #include "base/error.h"
-#include "multires/standard_views.h"
 #include "base/parallel.h"
 #include "base/text.h"
+#include "multires/standard_views.h"
 #include "render/offline/offline_picture.h"
 
 namespace pietra {
@@ -43,9 +43,9 @@ private:
     void parseRange(const std::string& text);
     void parseLight(const std::string& text);
     Culling culling() const;
-    OfflineSettings settings(const Scene& scene) const;
-    void showScalar(const Scene& scene, ShadeSettings& shade) const;
-    OfflinePicture draw(const Scene& scene, const Camera& camera, Progress& progress) const;
+    OfflineSettings settings(const ModelFiles& files) const;
+    void showScalar(const ModelFiles& files, ShadeSettings& shade) const;
+    OfflinePicture draw(const ModelFiles& files, const Camera& camera, Progress& progress) const;
     Json report(const OfflineStatistics& statistics, size_t resident_bytes) const;
 
     std::vector<std::string> files_;
@@ -163,22 +163,22 @@ Culling RenderVerb::culling() const {
     return {all || cull_ == "frustum", !two_sided_ && (all || cull_ == "cone"), all};
 }
 
-void RenderVerb::showScalar(const Scene& scene, ShadeSettings& shade) const {
-    const std::vector<std::string>& first = scene.models[0]->info().schema.scalars;
+void RenderVerb::showScalar(const ModelFiles& files, ShadeSettings& shade) const {
+    const std::vector<std::string>& first = files.models[0]->info().schema.scalars;
     const auto found = std::find(first.begin(), first.end(), scalar_);
     if (found == first.end())
         throw UsageError(fmt::format("{}: has no scalar '{}'", files_[0], scalar_));
     for (size_t i = 1; i < files_.size(); ++i)
-        if (scene.models[i]->info().schema.scalars != first)
+        if (files.models[i]->info().schema.scalars != first)
             throw UsageError(fmt::format("{}: has other scalars than {}", files_[i], files_[0]));
     shade.scalar_count = int(first.size());
     shade.scalar_index = int(found - first.begin());
     std::tie(shade.scalar_min, shade.scalar_max) =
         range_ ? std::pair(float(range_->first), float(range_->second))
-               : scalarRange(scene.views(), shade.scalar_index);
+               : scalarRange(files.views(), shade.scalar_index);
 }
 
-OfflineSettings RenderVerb::settings(const Scene& scene) const {
+OfflineSettings RenderVerb::settings(const ModelFiles& files) const {
     OfflineSettings settings;
     settings.pixels = pixels_;
     settings.culling = culling();
@@ -188,9 +188,9 @@ OfflineSettings RenderVerb::settings(const Scene& scene) const {
     settings.shade.show = show_;
     settings.shade.two_sided = two_sided_;
     settings.shade.light_direction = light_;
-    if (show_ == Show::kScalar) showScalar(scene, settings.shade);
+    if (show_ == Show::kScalar) showScalar(files, settings.shade);
     if (show_ == Show::kColour)
-        for (const auto& model : scene.models)
+        for (const auto& model : files.models)
             if (!model->info().schema.colours)
                 throw UsageError(fmt::format("{}: has no colours", model->path()));
     return settings;
@@ -210,10 +210,10 @@ Json RenderVerb::report(const OfflineStatistics& s, size_t resident_bytes) const
             {"tolerance_px", pixels_}};
 }
 
-OfflinePicture RenderVerb::draw(const Scene& scene, const Camera& camera,
+OfflinePicture RenderVerb::draw(const ModelFiles& files, const Camera& camera,
                                 Progress& progress) const {
     try {
-        return drawModels(scene.views(), camera, size_, settings(scene), progress);
+        return drawModels(files.views(), camera, size_, settings(files), progress);
     } catch (const MemoryError& error) {
         throw MemoryError(fmt::format("--ram {}: {}", formatBytes(ram_), error.what()));
     }
@@ -226,11 +226,11 @@ int RenderVerb::run(const RunContext& context) {
     const ThreadLimit threads(Limits{{}, jobs_}.threads());
     if (!output_.ends_with(".png")) throw UsageError(fmt::format("{}: is not named .png", output_));
     checkOutput(output_, context.common.force);
-    const Scene scene(files_);
-    Camera camera = camera_.camera(scene.bounds(), size_);
-    if (!camera_.fileGiven()) camera = movedCloser(camera, scene.balls(), size_);
+    const ModelFiles files(files_);
+    Camera camera = camera_.camera(files.bounds(), size_);
+    if (!camera_.fileGiven()) camera = movedCloser(camera, files.balls(), size_);
     context.progress.setStages(1);
-    const OfflinePicture drawn = draw(scene, camera, context.progress);
+    const OfflinePicture drawn = draw(files, camera, context.progress);
     const size_t resident = peakResidentBytes();
     writePng(drawn.picture, output_, context.common.force);
     logInfo(fmt::format("{}: {} triangles in {} patches, {:.0f} ms", output_,

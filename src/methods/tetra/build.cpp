@@ -29,8 +29,9 @@ struct MemoryPlan {
         constexpr size_t kLeast = size_t(64) << 20;
         budget = std::max(limit, kProgram + kLeast) - kProgram;
         work = std::min(budget * 3 / 4, std::max(budget / 3, size_t(jobs) * (size_t(192) << 20)));
-        // A triangle in flight has indices twice, corners, four cells and an order of its corners.
-        const size_t triangle_bytes = 2 * 24 + 3 * corner_bytes + 32 + 12;
+        // A triangle in flight has indices twice, and ahead once more, corners, four cells and an
+        // order of its corners.
+        const size_t triangle_bytes = 3 * 24 + 3 * corner_bytes + 32 + 12;
         partition.batch_triangles =
             std::clamp(work / 2 / triangle_bytes, size_t(1) << 14, size_t(4) << 20);
         partition.buffer_bytes = std::min(work / 4, size_t(128) << 20);

@@ -15,8 +15,9 @@ namespace pietra::tetra {
 
 namespace {
 
-/// A page holds whole diamonds and leaves, at least this many triangles of them.
-constexpr uint64_t kPageTriangles = 8192;
+/// A page holds whole diamonds and leaves, at least this many triangles of them; fewer in the coarse
+/// levels, so that all threads have work there, and a first picture needs little.
+constexpr uint64_t kPageTriangles = 8192, kSmallestPageTriangles = 1024, kUnitsOfLevel = 16;
 
 /// What a finished cell leaves to its parent.
 struct CellState {
@@ -133,10 +134,14 @@ std::vector<Item> LevelBuilder::itemsOf(int level) const {
 }
 
 std::vector<Unit> LevelBuilder::unitsOf(const std::vector<Item>& items) {
+    uint64_t of_level = 0;
+    for (const Item& item : items) of_level += item.triangles;
+    const uint64_t enough =
+        std::clamp(of_level / kUnitsOfLevel, kSmallestPageTriangles, kPageTriangles);
     std::vector<Unit> units;
-    uint64_t triangles = kPageTriangles;
+    uint64_t triangles = enough;
     for (size_t i = 0; i < items.size(); ++i) {
-        if (triangles >= kPageTriangles) {
+        if (triangles >= enough) {
             units.push_back({i, i});
             triangles = 0;
         }

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "render/draw_list.h"
+#include "multires/draw_list.h"
 #include "render/raster/projection.h"
 
 namespace pietra {

@@ -22,7 +22,7 @@
 
 #include "geometry/lattice.h"
 #include "multires/view.h"
-#include "render/draw_list.h"
+#include "multires/draw_list.h"
 #include "render/picture.h"
 #include "render/shading.h"
 

@@ -1,8 +1,8 @@
-#include "apps/pietra/scene.h"
+#include "apps/pietra/model_files.h"
 
 namespace pietra {
 
-Scene::Scene(const std::vector<std::string>& paths) {
+ModelFiles::ModelFiles(const std::vector<std::string>& paths) {
     for (const std::string& path : paths) models.push_back(std::make_unique<ModelReader>(path));
 }
 
@@ -14,13 +14,13 @@ Box3d boundsOf(const ModelReader& model) {
     return box;
 }
 
-Box3d Scene::bounds() const {
+Box3d ModelFiles::bounds() const {
     Box3d box;
     for (const auto& model : models) box.add(boundsOf(*model));
     return box;
 }
 
-std::vector<Sphere> Scene::balls() const {
+std::vector<Sphere> ModelFiles::balls() const {
     constexpr uint16_t kLevel = 9;
     std::vector<Sphere> balls;
     for (const auto& model : models) {
@@ -33,7 +33,7 @@ std::vector<Sphere> Scene::balls() const {
     return balls;
 }
 
-std::vector<const ModelReader*> Scene::views() const {
+std::vector<const ModelReader*> ModelFiles::views() const {
     std::vector<const ModelReader*> all;
     for (const auto& model : models) all.push_back(model.get());
     return all;

@@ -10,11 +10,11 @@
 
 namespace pietra {
 
-struct Scene {
+struct ModelFiles {
     std::vector<std::unique_ptr<ModelReader>> models;
 
     /// Opens all; throws what ModelReader throws.
-    explicit Scene(const std::vector<std::string>& paths);
+    explicit ModelFiles(const std::vector<std::string>& paths);
     /// Of all models, in input coordinates.
     Box3d bounds() const;
     /// Balls that hold all models, some tens or hundreds, in input coordinates.

@@ -1,0 +1,167 @@
+#include "apps/pietra/flight.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <thread>
+
+#include "base/check.h"
+#include "render/raster/rasteriser.h"
+
+namespace pietra {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+const Clock::time_point kStart = Clock::now();
+
+constexpr int kSampledFrames = 24;
+constexpr int kRepeats = 3;
+constexpr double kMostWaitMs = 60'000;
+
+double msSince(Clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+class Flight {
+public:
+    Flight(const std::vector<const ModelReader*>& models, const CameraPath& path,
+           const FlightSettings& settings)
+        : models_(models), path_(path), settings_(settings), scene_(models, settings.scene) {}
+
+    FlightRecord run(const std::function<void(int)>& progress) {
+        const auto start = Clock::now();
+        for (int i = 0; i < settings_.frames; ++i) {
+            if (settings_.real_time) waitFor(start, timeOf(i));
+            record_.frames.push_back(frame(request(i)));
+            if (record_.first_image_ms < 0 && record_.frames.back().tolerance_px <= kFirstImagePx)
+                record_.first_image_ms = msSinceStart();
+            progress(i);
+        }
+        record_.seconds = msSince(start) / 1e3;
+        awaitConvergence();
+        if (settings_.draw) compareWithStaticDraws();
+        record_.faults = scene_.faults();
+        return std::move(record_);
+    }
+
+private:
+    double timeOf(int i) const {
+        return settings_.frames == 1 ? 0 : path_.seconds * i / (settings_.frames - 1);
+    }
+
+    static void waitFor(Clock::time_point start, double seconds) {
+        std::this_thread::sleep_until(start + std::chrono::duration_cast<Clock::duration>(
+                                                  std::chrono::duration<double>(seconds)));
+    }
+
+    FrameRequest request(int i) const {
+        FrameRequest request;
+        request.camera = path_.frame(i, settings_.frames);
+        request.size = settings_.size;
+        request.pixels = settings_.pixels;
+        request.seconds = timeOf(i);
+        request.culling = settings_.culling;
+        request.prefetch = settings_.prefetch;
+        return request;
+    }
+
+    FrameRecord frame(const FrameRequest& request) {
+        const auto start = Clock::now();
+        const Frame& frame = scene_.update(request);
+        FrameRecord record;
+        record.select_ms = frame.select_ms;
+        record.load_ms = frame.publish_ms;
+        if (settings_.draw) record.draw_ms = draw(frame);
+        record.ms = msSince(start);
+        record.triangles = frame.triangles;
+        record.patches = frame.patch_count;
+        record.bytes_read = frame.bytes_read - bytes_read_;
+        bytes_read_ = frame.bytes_read;
+        record.resident_bytes = frame.resident_bytes;
+        record.tolerance_px = frame.tolerance_px;
+        record.converged = frame.converged;
+        return record;
+    }
+
+    double draw(const Frame& frame) {
+        const auto start = Clock::now();
+        const auto lattice = [&](size_t m) -> const Lattice& { return models_[m]->info().lattice; };
+        const ShadeSettings shade;
+        if (!rasteriser_)
+            rasteriser_.emplace(frame.models[0].view, lattice(0), settings_.samples, shade);
+        else
+            rasteriser_->restart(frame.models[0].view, lattice(0), shade);
+        for (size_t m = 0; m < frame.models.size(); ++m) {
+            rasteriser_->setModel(frame.models[m].view, lattice(m));
+            rasteriser_->draw(frame.models[m].patches);
+        }
+        rasteriser_->finish();
+        return msSince(start);
+    }
+
+    void awaitConvergence() {
+        const auto stop = Clock::now();
+        FrameRequest last = request(settings_.frames - 1);
+        while (msSince(stop) < kMostWaitMs) {
+            last.seconds += 1.0 / 60;
+            if (frame(last).converged) {
+                record_.converged_ms = msSince(stop);
+                return;
+            }
+        }
+    }
+
+    void compareWithStaticDraws() {
+        std::vector<double> ratios, static_ms;
+        const int step = std::max(1, settings_.frames / kSampledFrames);
+        for (int i = 0; i < settings_.frames; i += step) {
+            FrameRequest sampled = request(i);
+            sampled.prefetch = false;
+            const Frame& resident = scene_.converge(sampled);
+            std::vector<double> whole, still;
+            for (int repeat = 0; repeat < kRepeats; ++repeat) {
+                still.push_back(draw(resident));
+                whole.push_back(frame(sampled).ms);
+            }
+            ratios.push_back(percentile(whole, 0.5) / percentile(still, 0.5));
+            static_ms.push_back(percentile(still, 0.5));
+        }
+        record_.overhead_ratio = percentile(ratios, 0.5);
+        std::vector<double> stalls;
+        for (size_t i = 0; i < record_.frames.size(); ++i)
+            stalls.push_back(record_.frames[i].ms /
+                             static_ms[std::min(i / size_t(step), static_ms.size() - 1)]);
+        record_.stall_p99 = percentile(stalls, 0.99);
+    }
+
+    std::vector<const ModelReader*> models_;
+    const CameraPath& path_;
+    const FlightSettings& settings_;
+    Scene scene_;
+    std::optional<Rasteriser> rasteriser_;
+    uint64_t bytes_read_ = 0;
+    FlightRecord record_;
+};
+
+}  // namespace
+
+double msSinceStart() {
+    return msSince(kStart);
+}
+
+FlightRecord fly(const std::vector<const ModelReader*>& models, const CameraPath& path,
+                 const FlightSettings& settings, const std::function<void(int)>& progress) {
+    CHECK(settings.frames >= 1 && !models.empty());
+    return Flight(models, path, settings).run(progress);
+}
+
+double percentile(std::vector<double> values, double p) {
+    if (values.empty()) return 0;
+    const size_t rank = std::min(values.size() - 1, size_t(p * double(values.size())));
+    std::nth_element(values.begin(), values.begin() + ptrdiff_t(rank), values.end());
+    return values[rank];
+}
+
+}  // namespace pietra

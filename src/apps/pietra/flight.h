@@ -1,0 +1,58 @@
+#pragma once
+// A camera path flown through a scene, frame by frame, and measured.
+
+#include <functional>
+#include <vector>
+
+#include "render/shading.h"
+#include "runtime/camera_path.h"
+#include "runtime/scene.h"
+
+namespace pietra {
+
+struct FlightSettings {
+    int frames = 0;  ///< at least 1
+    PictureSize size;
+    double pixels = 1;
+    Culling culling{true, true, true};
+    bool prefetch = true;
+    int samples = 1;
+    bool draw = true;
+    /// In real time: no frame is shown before its time on the path. Else as fast as it can.
+    bool real_time = false;
+    SceneSettings scene;
+};
+
+struct FrameRecord {
+    double ms = 0, select_ms = 0, load_ms = 0, draw_ms = 0;
+    uint64_t triangles = 0, patches = 0;
+    uint64_t bytes_read = 0;  ///< in this frame
+    size_t resident_bytes = 0;
+    double tolerance_px = 0;
+    bool converged = false;
+};
+
+struct FlightRecord {
+    std::vector<FrameRecord> frames;
+    double seconds = 0;          ///< of the flight
+    double first_image_ms = -1;  ///< since `epoch`: the first picture at kFirstImagePx; -1: none
+    double converged_ms = -1;    ///< after the last frame; -1: not within a minute
+    /// Of sampled frames with everything resident: the whole frame over drawing its list once more.
+    double overhead_ratio = 0;
+    double stall_p99 = 0;  ///< of all frames: time over that of drawing the nearest sample's list
+    std::vector<std::string> faults;
+};
+
+inline constexpr double kFirstImagePx = 16;
+
+/// Since the process started, about.
+double msSinceStart();
+
+/// Throws what opening a scene throws. `progress(i)` after each frame.
+FlightRecord fly(const std::vector<const ModelReader*>& models, const CameraPath& path,
+                 const FlightSettings& settings, const std::function<void(int)>& progress);
+
+/// The value that a share `p` of the values does not exceed; 0 of none.
+double percentile(std::vector<double> values, double p);
+
+}  // namespace pietra

@@ -1,0 +1,102 @@
+#pragma once
+// One view on one model whose refinement is by groups of nodes: what of it to draw in this frame
+// with what is resident, and which pages would make it finer, in the order of need (Cignoni et al.
+// 2004, section 4). Neither waits nor touches a file.
+
+#include <span>
+#include <vector>
+
+#include "multires/cut.h"
+#include "runtime/residency.h"
+
+namespace pietra {
+
+struct PageRequest {
+    PageIndex page = 0;
+    float pixels = 0;  ///< the error on screen of what it would refine; largest first
+};
+
+struct Selection {
+    std::vector<NodeIndex> draw;
+    /// Pages that are missing, each once, largest error first, none before those it depends on.
+    std::vector<PageRequest> requests;
+    /// Largest error on screen of what is drawn, in pixels; infinite where the eye is inside a
+    /// sphere that could not be refined.
+    double largest_px = 0;
+    uint64_t triangles = 0;
+};
+
+class ForestRefiner {
+public:
+    explicit ForestRefiner(const Residency& residency);
+
+    /// Overwrites `selection`. All roots must be resident. Every node drawn that is not culled
+    /// shows at most `pixels` of error, or waits for the pages requested. Linear in the groups
+    /// visited.
+    void select(const View& view, double pixels, const Culling& culling, Selection& selection);
+    /// Appends what another view would request and select() has not: after it, in the same frame.
+    void prefetch(const View& view, double pixels, const Culling& culling,
+                  std::vector<PageRequest>& requests);
+
+    /// visit(node) for each node of the cut that nothing is culled from, as far as it is resident.
+    template <class Visit>
+    void visitDrawable(const View& view, double pixels, const Visit& visit_node) {
+        visit(
+            view, pixels, {}, [&](NodeIndex i, double) { visit_node(i); }, [](uint32_t) {});
+    }
+
+    /// The last select() could not have drawn what it did without this page.
+    bool used(PageIndex page) const { return page_used_[page] == selects_; }
+
+private:
+    /// A group that should be refined and is not open.
+    struct Missing {
+        uint32_t group;
+        float pixels;
+    };
+
+    template <class Draw, class Refined>
+    void visit(const View& view, double pixels, const Culling& culling, const Draw& draw,
+               const Refined& refined);
+    void requestMissing(std::vector<PageRequest>& requests);
+    void use(uint32_t group);
+    void request(uint32_t group, float pixels, std::vector<PageRequest>& requests);
+    void requestPage(PageIndex page, float pixels, std::vector<PageRequest>& requests);
+
+    const Residency& residency_;
+    const Forest& forest_;
+    std::vector<NodeIndex> stack_;
+    std::vector<Missing> missing_;
+    std::vector<uint32_t> group_used_, page_used_;            // by which select() last
+    std::vector<uint32_t> group_requested_, page_requested_;  // in which round last
+    uint32_t selects_ = 0, round_ = 0;
+};
+
+/// Top-down over what may be visible: draw(node, pixels of error), refined(group) for those that
+/// are refined; those that should be go to `missing_`.
+template <class Draw, class Refined>
+void ForestRefiner::visit(const View& view, double pixels, const Culling& culling, const Draw& draw,
+                          const Refined& refined) {
+    missing_.clear();
+    stack_ = forest_.roots();
+    while (!stack_.empty()) {
+        const NodeIndex i = stack_.back();
+        stack_.pop_back();
+        const Node& node = forest_.node(i);
+        if (branchInvisible(node, view, pixels, culling)) continue;
+        const double error = view.errorInPixels(node.error, node.saturated);
+        if (!node.isLeaf() && !(error <= pixels)) {
+            const uint32_t group = forest_.groupOf(i);
+            if (residency_.open(group)) {
+                refined(group);
+                for (const NodeIndex child : node.child)
+                    if (child != kNoNode) stack_.push_back(child);
+                continue;
+            }
+            missing_.push_back({group, float(error)});
+        }
+        if (!patchInvisible(node, view, pixels, culling)) draw(i, error);
+    }
+}
+
+}  // namespace pietra

@@ -1,0 +1,72 @@
+#include "runtime/page_loader.h"
+
+#include <algorithm>
+#include <iterator>
+
+namespace pietra {
+
+PageLoader::PageLoader(std::vector<const ModelReader*> models, int threads)
+    : models_(std::move(models)) {
+    for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
+}
+
+PageLoader::~PageLoader() {
+    {
+        const std::lock_guard lock(mutex_);
+        stop_ = true;
+    }
+    wake_.notify_all();
+    for (std::thread& thread : threads_) thread.join();
+}
+
+void PageLoader::want(std::vector<PageKey> wanted, std::vector<PageKey>& begun) {
+    const std::lock_guard lock(mutex_);
+    const auto has_begun = [&](const PageKey& key) {
+        return std::find(begun_.begin(), begun_.end(), key) != begun_.end();
+    };
+    queue_.clear();
+    for (const PageKey& key : wanted)
+        if (!has_begun(key)) queue_.push_back(key);
+    begun.insert(begun.end(), begun_.begin(), begun_.end());
+    if (!queue_.empty()) wake_.notify_all();
+}
+
+void PageLoader::take(std::vector<LoadedPage>& pages) {
+    const std::lock_guard lock(mutex_);
+    for (const LoadedPage& page : ready_)
+        begun_.erase(std::find(begun_.begin(), begun_.end(), page.key));
+    std::move(ready_.begin(), ready_.end(), std::back_inserter(pages));
+    ready_.clear();
+}
+
+uint64_t PageLoader::bytesRead() const {
+    const std::lock_guard lock(mutex_);
+    return bytes_read_;
+}
+
+/// False if there is nothing more to do, ever.
+bool PageLoader::next(PageKey& key) {
+    std::unique_lock lock(mutex_);
+    wake_.wait(lock, [&] { return stop_ || !queue_.empty(); });
+    if (stop_) return false;
+    key = queue_.front();
+    queue_.pop_front();
+    begun_.push_back(key);
+    return true;
+}
+
+void PageLoader::work() {
+    std::vector<std::byte> bytes;
+    for (PageKey key; next(key);) {
+        LoadedPage loaded{key, {}, {}};
+        const ModelReader& model = *models_[key.model];
+        if (!model.tryReadPage(key.page, bytes, loaded.fault) ||
+            !model.tryDecode(key.page, bytes, loaded.patches, loaded.fault))
+            loaded.patches.clear();
+        const std::lock_guard lock(mutex_);
+        bytes_read_ += bytes.size();
+        ready_.push_back(std::move(loaded));
+    }
+}
+
+}  // namespace pietra

@@ -1,0 +1,65 @@
+#pragma once
+// Threads that read and decode pages for a frame thread that never waits for them.
+//
+// The frame thread says each frame which pages are wanted, best first; what no thread has begun is
+// forgotten then. Decoded pages wait until they are taken. All functions but the destructor return
+// at once and are for one thread; the loader's threads end in the destructor.
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "geometry/mesh.h"
+#include "store/model_reader.h"
+
+namespace pietra {
+
+/// A page of one of the models in a scene.
+struct PageKey {
+    uint32_t model = 0;
+    uint32_t page = 0;
+    bool operator==(const PageKey&) const = default;
+};
+
+struct LoadedPage {
+    PageKey key;
+    std::vector<Mesh> patches;
+    std::string fault;  ///< if not empty, the page is damaged or cannot be read, and has no patches
+};
+
+class PageLoader {
+public:
+    /// Readers must outlive this.
+    PageLoader(std::vector<const ModelReader*> models, int threads);
+    ~PageLoader();
+    PageLoader(const PageLoader&) = delete;
+    PageLoader& operator=(const PageLoader&) = delete;
+
+    /// Replaces what no thread has begun by `wanted`, best first. Appends to `begun` the pages that
+    /// threads have begun and nobody has taken.
+    void want(std::vector<PageKey> wanted, std::vector<PageKey>& begun);
+    /// Appends what is ready, in the order in which it became so.
+    void take(std::vector<LoadedPage>& pages);
+    /// Bytes read from files so far.
+    uint64_t bytesRead() const;
+
+private:
+    void work();
+    bool next(PageKey& key);
+
+    std::vector<const ModelReader*> models_;
+    mutable std::mutex mutex_;
+    std::condition_variable wake_;
+    std::deque<PageKey> queue_;
+    std::vector<PageKey> begun_;  // until taken
+    std::vector<LoadedPage> ready_;
+    uint64_t bytes_read_ = 0;
+    bool stop_ = false;
+    std::vector<std::thread> threads_;
+};
+
+}  // namespace pietra

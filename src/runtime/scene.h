@@ -1,0 +1,81 @@
+#pragma once
+// Models that are looked at: which of their pages are in memory, and what to draw in a frame. The
+// frame thread calls update() and draws; it never waits for a file. Whatever has been loaded, every
+// frame is a valid, crack-free cut of each model (residency.h).
+//
+// All models share one budget of decoded pages. Pages that a frame needs are never evicted for
+// others; where they do not fit, the tolerance is raised until they do, and lowered again when
+// there is room. Pages for views to come are loaded after all that are needed now.
+//
+// One thread calls; deterministic but for what the loader's threads have ready when.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "multires/draw_list.h"
+#include "runtime/eye_side.h"
+#include "runtime/forest_refiner.h"
+#include "runtime/page_loader.h"
+
+namespace pietra {
+
+struct SceneSettings {
+    size_t ram_bytes = size_t(1) << 30;  ///< of decoded pages, those being decoded included
+    int loader_threads = 2;
+};
+
+/// What a frame asks for.
+struct FrameRequest {
+    Camera camera;
+    PictureSize size;
+    double pixels = 1;   ///< tolerance
+    double seconds = 0;  ///< since the beginning, for the prediction of where the camera goes
+    Culling culling{true, true, true};
+    bool prefetch = true;
+};
+
+/// What is drawn of a model.
+struct ModelFrame {
+    explicit ModelFrame(const View& v) : view(v) {}
+    View view;
+    bool two_sided = false;  ///< the eye may be inside of a closed part
+    Selection selection;
+    std::vector<DrawPatch> patches;  ///< meshes are valid until the next update()
+};
+
+struct Frame {
+    std::vector<ModelFrame> models;
+    /// What the picture keeps to: what was asked for, or more, because pages are missing or do not
+    /// fit. Infinite where the eye is inside a sphere that could not be refined.
+    double tolerance_px = 0;
+    bool converged = false;  ///< nothing is missing, at the tolerance asked for
+    uint64_t triangles = 0, patch_count = 0;
+    size_t resident_bytes = 0;
+    uint64_t bytes_read = 0;  ///< since the beginning
+    double publish_ms = 0, select_ms = 0;
+};
+
+class Scene {
+public:
+    /// Models must outlive this. Loads the roots, waiting for them. Throws MemoryError, which says
+    /// how much is needed, if they do not fit, and what reading throws.
+    Scene(std::vector<const ModelReader*> models, const SceneSettings& settings);
+    ~Scene();
+
+    /// Valid until the next call.
+    const Frame& update(const FrameRequest& request);
+    /// Waits until everything that `request` asks for is there or is known not to fit. For
+    /// screenshots and measurements.
+    const Frame& converge(const FrameRequest& request);
+
+    /// Pages that cannot be read: a sentence each. What they hold is drawn coarser.
+    const std::vector<std::string>& faults() const;
+
+private:
+    struct Model;
+    class Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace pietra
