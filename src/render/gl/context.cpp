@@ -22,8 +22,12 @@ struct GlContext::State {
 
     /// note: the display is left initialised: it is the process's, others may use it.
     ~State();
-    bool makeCurrent() const {
-        return eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context) == EGL_TRUE;
+    bool makeCurrent() const { return use(context); }
+    bool leave() const { return use(EGL_NO_CONTEXT); }
+    /// note: the API is a property of the thread, and what is current is so for one API.
+    bool use(EGLContext which) const {
+        return eglBindAPI(EGL_OPENGL_API) == EGL_TRUE &&
+               eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, which) == EGL_TRUE;
     }
     void listen();
 };
@@ -107,8 +111,7 @@ EGLContext createContext(EGLDisplay display, bool debug) {
 
 GlContext::State::~State() {
     if (context == EGL_NO_CONTEXT) return;
-    if (eglGetCurrentContext() == context)
-        eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    if (eglBindAPI(EGL_OPENGL_API) == EGL_TRUE && eglGetCurrentContext() == context) leave();
     eglDestroyContext(display, context);
 }
 
@@ -160,6 +163,10 @@ GlContext::~GlContext() = default;
 
 void GlContext::makeCurrent() {
     if (state_->context != EGL_NO_CONTEXT) CHECK(state_->makeCurrent());
+}
+
+void GlContext::leave() {
+    if (state_->context != EGL_NO_CONTEXT) CHECK(state_->leave());
 }
 
 const std::string& GlContext::renderer() const {

@@ -35,6 +35,9 @@ public:
 
     /// Makes a headless context current in this thread; does nothing for an adopted one.
     void makeCurrent();
+    /// Leaves this thread without a context, so that another thread may make it current; does
+    /// nothing for an adopted one.
+    void leave();
     /// The driver's name for itself, and for its version.
     const std::string& renderer() const;
     const std::string& version() const;

@@ -3,6 +3,8 @@
 #include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
+#include <thread>
+
 #include "render/gl/test_context.h"
 
 namespace pietra {
@@ -39,6 +41,20 @@ TEST_F(GlContextTest, SeveralTakeTurns) {
     EXPECT_FALSE(glIsBuffer(name));
     other.makeCurrent();
     EXPECT_TRUE(glIsBuffer(name));
+}
+
+TEST_F(GlContextTest, GoesFromThreadToThread) {
+    GLuint name = 0;
+    glCreateBuffers(1, &name);
+    context_->leave();
+    std::thread([&] {
+        context_->makeCurrent();
+        EXPECT_TRUE(glIsBuffer(name));
+        glDeleteBuffers(1, &name);
+        context_->leave();
+    }).join();
+    context_->makeCurrent();
+    EXPECT_FALSE(glIsBuffer(name));
 }
 
 }  // namespace
