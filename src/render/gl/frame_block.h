@@ -19,12 +19,10 @@ struct FrameBlock {
     glm::vec2 clip_from_view;
     float depth_scale, inv_focal;
     Vec3f light;
-    int32_t show;
-    glm::vec2 centre, scalar_range;
     float near_depth;
-    float padding[3];
+    glm::vec2 centre, scalar_range;
 };
-static_assert(sizeof(FrameBlock) == 112);
+static_assert(sizeof(FrameBlock) == 96);
 
 struct DrawRecord {
     static constexpr uint32_t kBothSides = 1;
@@ -45,7 +43,7 @@ static_assert(sizeof(DrawCommand) == 20);
 
 struct FinishBlock {
     float reference;
-    int32_t show_depth;
+    float padding;
     int32_t width, height;
 };
 static_assert(sizeof(FinishBlock) == 16);

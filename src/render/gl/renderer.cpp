@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <optional>
 
@@ -38,12 +39,49 @@ std::string lightDefines() {
         vector(kKeyLight), vector(kSkyLight), vector(kGroundLight), kEyeLight, kShine);
 }
 
-GlProgram makeDrawProgram(bool attributes, int samples) {
-    return makeProgram(
-        {{GL_VERTEX_SHADER, {"frame_block.glsl", "srgb.glsl", "patch_draw.vert.glsl"}},
-         {GL_FRAGMENT_SHADER, {"frame_block.glsl", "srgb.glsl", "patch_draw.frag.glsl"}}},
-        fmt::format("{}#define SAMPLES {}\n{}", attributes ? "#define ATTRIBUTES\n" : "", samples,
-                    lightDefines()));
+/// What a program is made for: where a surface's colour is from, and what becomes of it.
+enum class Look { kLit, kLitColours, kLitTriangles, kLitScalar, kFlat, kFlatColours, kNormals };
+constexpr size_t kLooks = 7;
+constexpr const char* kLookDefines[kLooks] = {
+    "#define BASE PATCH_COLOUR\n#define LIGHT LIT\n",
+    "#define BASE VERTEX_COLOUR\n#define LIGHT LIT\n",
+    "#define BASE TRIANGLE_COLOUR\n#define LIGHT LIT\n",
+    "#define BASE SCALAR_COLOUR\n#define LIGHT LIT\n",
+    "#define BASE PATCH_COLOUR\n#define LIGHT UNLIT\n",
+    "#define BASE VERTEX_COLOUR\n#define LIGHT UNLIT\n",
+    "#define BASE PATCH_COLOUR\n#define LIGHT NORMALS\n",
+};
+
+Look lookOf(Show show, const VertexLayout& layout) {
+    switch (show) {
+        case Show::kShaded:
+            return layout.colours ? Look::kLitColours : Look::kLit;
+        case Show::kColour:
+            return layout.colours ? Look::kFlatColours : Look::kFlat;
+        case Show::kScalar:
+            return layout.scalars > 0 ? Look::kLitScalar : Look::kLit;
+        case Show::kTriangles:
+            return Look::kLitTriangles;
+        case Show::kNormals:
+            return Look::kNormals;
+        case Show::kDepth:
+            return Look::kFlat;  // painted over when the picture is finished
+        case Show::kLod:
+        case Show::kPatches:
+        case Show::kError:
+            return Look::kLit;
+    }
+    return Look::kLit;
+}
+
+std::array<GlProgram, kLooks> makeDrawPrograms(int samples) {
+    std::array<GlProgram, kLooks> programs;
+    for (size_t i = 0; i < kLooks; ++i)
+        programs[i] = makeProgram(
+            {{GL_VERTEX_SHADER, {"frame_block.glsl", "srgb.glsl", "patch_draw.vert.glsl"}},
+             {GL_FRAGMENT_SHADER, {"frame_block.glsl", "srgb.glsl", "patch_draw.frag.glsl"}}},
+            fmt::format("{}#define SAMPLES {}\n{}", kLookDefines[i], samples, lightDefines()));
+    return programs;
 }
 
 GlTexture makeScalarColours() {
@@ -106,7 +144,7 @@ struct GlRenderer::State {
     UploadRing ring;
     PageStore pages;
     Targets targets;
-    GlProgram plain, with_attributes;
+    std::array<GlProgram, kLooks> programs;
     GlTexture scalar_colours;
     GlVertexArray vertex_array;
     GlQuery timer[2];
@@ -129,7 +167,6 @@ struct GlRenderer::State {
     void setState() const;
     static void leaveState();
     void enqueue(std::span<const GlItem> items);
-    bool usesAttributes(const VertexLayout& layout) const;
     void submit(std::span<const GlItem> items, std::span<const QueuedDraw> chunk);
     void bindGroup(const DrawGroup& group);
     DrawRecord recordOf(const GlItem& item, const QueuedDraw& draw) const;
@@ -140,8 +177,7 @@ GlRenderer::State::State(const PictureSize& size, int samples, size_t vram_bytes
     : ring(ringBytes(vram_bytes)),
       pages(vram_bytes - ringBytes(vram_bytes), ring),
       targets(size, samples),
-      plain(makeDrawProgram(false, samples)),
-      with_attributes(makeDrawProgram(true, samples)),
+      programs(makeDrawPrograms(samples)),
       scalar_colours(makeScalarColours()),
       vertex_array(makeVertexArray(pages.buffer())) {
     GLuint names[2];
@@ -182,7 +218,6 @@ void GlRenderer::State::setModel(const View& view, const Lattice& lattice) {
     frame.depth_scale = reference * p.inv_step;
     frame.inv_focal = float(1 / view.focal_px());
     frame.light = Vec3f(glm::normalize(settings.light_direction));
-    frame.show = int32_t(settings.show);
     const float range = settings.scalar_max - settings.scalar_min;
     frame.scalar_range = {settings.scalar_min, range > 0 ? 1 / range : 0};
     frame.centre = 0.5f * glm::vec2(float(view.size().width), float(view.size().height));
@@ -224,18 +259,6 @@ void GlRenderer::State::leaveState() {
     glUseProgram(0);
 }
 
-bool GlRenderer::State::usesAttributes(const VertexLayout& layout) const {
-    switch (settings.show) {
-        case Show::kScalar:
-            return layout.scalars > 0;
-        case Show::kShaded:
-        case Show::kColour:
-            return layout.colours;
-        default:
-            return false;
-    }
-}
-
 void GlRenderer::State::enqueue(std::span<const GlItem> items) {
     queue.clear();
     const StoredPage* page = nullptr;
@@ -268,9 +291,8 @@ DrawRecord GlRenderer::State::recordOf(const GlItem& item, const QueuedDraw& dra
 }
 
 void GlRenderer::State::bindGroup(const DrawGroup& group) {
-    const bool attributes = usesAttributes(group.layout);
-    const bool scalar = attributes && settings.show == Show::kScalar;
-    glUseProgram(attributes ? with_attributes : plain);
+    const Look look = lookOf(settings.show, group.layout);
+    glUseProgram(programs[size_t(look)]);
     (group.culled ? glEnable : glDisable)(GL_CULL_FACE);
     const auto bind = [&](GLuint attribute, uint32_t offset) {
         glVertexArrayVertexBuffer(vertex_array, attribute, pages.buffer(), GLintptr(offset),
@@ -281,8 +303,9 @@ void GlRenderer::State::bindGroup(const DrawGroup& group) {
         (used ? glEnableVertexArrayAttrib : glDisableVertexArrayAttrib)(vertex_array, attribute);
     };
     bind(kPosition, 0);
-    bindOptional(kColour, attributes && !scalar, VertexLayout::kColourOffset);
-    bindOptional(kScalar, scalar,
+    bindOptional(kColour, look == Look::kLitColours || look == Look::kFlatColours,
+                 VertexLayout::kColourOffset);
+    bindOptional(kScalar, look == Look::kLitScalar,
                  group.layout.scalarOffset() + 4 * uint32_t(settings.scalar_index));
 }
 
@@ -394,6 +417,10 @@ void GlRenderer::draw(std::span<const GlItem> items) {
     const std::span<const QueuedDraw> queue(s.queue);
     for (size_t begin = 0; begin < queue.size(); begin += chunk)
         s.submit(items, queue.subspan(begin, std::min(chunk, queue.size() - begin)));
+}
+
+void GlRenderer::finish() {
+    state_->finish();
 }
 
 Picture GlRenderer::readPicture() {

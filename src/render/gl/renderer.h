@@ -83,7 +83,9 @@ public:
     /// is the same camera in its coordinates.
     void setModel(const View& view, const Lattice& lattice);
     void draw(std::span<const GlItem> items);
-    /// Completes the picture and waits for it. Nothing can be drawn before the next begin().
+    /// Completes the picture, without waiting for it. Nothing can be drawn before the next begin().
+    void finish();
+    /// Completes the picture and waits for it.
     Picture readPicture();
     /// Completes the picture and copies it to the window's lower left corner.
     void present();

@@ -34,10 +34,14 @@ GlFramebuffer makeFramebuffer(GLuint depth, std::initializer_list<GLuint> colour
 Targets::Targets(const PictureSize& size, int samples) : samples_(samples) {
     CHECK(samples == 1 || samples == 4);
     const std::string defines = fmt::format("#define SAMPLES {}\n", samples);
-    finish_program_ = makeProgram(
-        {{GL_VERTEX_SHADER, {"picture_finish.vert.glsl"}},
-         {GL_FRAGMENT_SHADER, {"srgb.glsl", "picture_finish.glsl", "picture_finish.frag.glsl"}}},
-        defines);
+    const auto finishProgram = [&](const char* more) {
+        return makeProgram({{GL_VERTEX_SHADER, {"picture_finish.vert.glsl"}},
+                            {GL_FRAGMENT_SHADER,
+                             {"srgb.glsl", "picture_finish.glsl", "picture_finish.frag.glsl"}}},
+                           defines + more);
+    };
+    finish_program_ = finishProgram("");
+    depth_program_ = finishProgram("#define SHOW_DEPTH\n");
     first_range_program_ =
         makeProgram({{GL_VERTEX_SHADER, {"picture_finish.vert.glsl"}},
                      {GL_FRAGMENT_SHADER, {"picture_finish.glsl", "depth_range.frag.glsl"}}},
@@ -138,7 +142,7 @@ void Targets::findDepthRange() const {
 }
 
 void Targets::finish(float reference, bool show_depth, UploadRing& ring) {
-    const FinishBlock block{reference, show_depth, size_.width, size_.height};
+    const FinishBlock block{reference, 0, size_.width, size_.height};
     const RingSpace space = ring.take(sizeof(block), 256);
     std::memcpy(space.memory, &block, sizeof(block));
     glBindBufferRange(GL_UNIFORM_BUFFER, kFinishBinding, ring.buffer(), space.offset,
@@ -157,7 +161,7 @@ void Targets::finish(float reference, bool show_depth, UploadRing& ring) {
     if (show_depth) findDepthRange();
     glBindFramebuffer(GL_FRAMEBUFFER, finished_);
     glViewport(0, 0, size_.width, size_.height);
-    glUseProgram(finish_program_);
+    glUseProgram(show_depth ? depth_program_ : finish_program_);
     glDrawArrays(GL_TRIANGLES, 0, 3);
     ring.used();
 }

@@ -47,7 +47,7 @@ private:
     GlFramebuffer drawn_, finished_;
     std::vector<RangeStep> range_steps_;
     GlVertexArray no_vertices_;
-    GlProgram finish_program_, first_range_program_, range_program_;
+    GlProgram finish_program_, depth_program_, first_range_program_, range_program_;
     bool background_painted_ = false;
     Rgba8 background_top_, background_bottom_;
 };

@@ -5,13 +5,22 @@ layout(std140, binding = 0) uniform Frame {
     float depth_scale;        // what the depth buffer holds, times the depth in lattice units
     float inv_focal;          // 1 / pixels
     vec3 light;               // towards the light, in view space, unit length
-    int show;                 // the numbers of enum Show
+    float near_depth;         // in lattice units
     vec2 centre;              // of the picture, in pixels
     vec2 scalar_range;        // lowest value, 1 / range
-    float near_depth;         // in lattice units
 };
 
-const int kShaded = 0, kNormals = 1, kDepth = 2, kTriangles = 5, kColour = 7, kScalar = 8;
+// What programs are made for: see Look of renderer.cpp.
+#define PATCH_COLOUR 0
+#define VERTEX_COLOUR 1
+#define TRIANGLE_COLOUR 2
+#define SCALAR_COLOUR 3
+#define UNLIT 0
+#define LIT 1
+#define NORMALS 2
+#if BASE == VERTEX_COLOUR || BASE == SCALAR_COLOUR
+#define HAS_VERTEX_VALUE
+#endif
 
 // Of DrawRecord::flags of frame_block.h.
 const uint kBothSides = 1u;

@@ -1,11 +1,12 @@
 // A pixel of a patch: the light of raster/shade_kernel.cpp, whose constants come from shading.h as
 // macros. The result is in linear light; the target turns it to sRGB.
+//
+// Each view has a program of its own: llvmpipe computes what a branch leaves out, too.
 
 in vec3 view_normal;
 flat in uvec4 patch_words;
-#ifdef ATTRIBUTES
+#ifdef HAS_VERTEX_VALUE
 in vec3 vertex_value;
-layout(binding = 0) uniform sampler1D scalar_colours;
 #endif
 
 layout(location = 0) out vec4 colour;
@@ -30,6 +31,24 @@ void findPlace() {
 }
 #endif
 
+#if BASE == PATCH_COLOUR
+vec3 baseColour() {
+    return uintBitsToFloat(patch_words.xyz);
+}
+#elif BASE == VERTEX_COLOUR
+vec3 baseColour() {
+    // The patch's colour is that of its tint; it does not matter where there is no light.
+    vec3 colour_there = max(AT_PLACE(vertex_value), 0.0);
+    return LIGHT == LIT ? uintBitsToFloat(patch_words.xyz) * colour_there : colour_there;
+}
+#elif BASE == SCALAR_COLOUR
+layout(binding = 0) uniform sampler1D scalar_colours;
+vec3 baseColour() {
+    int last = textureSize(scalar_colours, 0) - 1;
+    float t = clamp(AT_PLACE(vertex_value).x, 0.0, 1.0);
+    return textureLod(scalar_colours, (t * last + 0.5) / (last + 1), 0.0).rgb;
+}
+#else
 // The low 64 bits of a product; x is the low word.
 uvec2 times(uvec2 a, uvec2 b) {
     uint high, low;
@@ -54,22 +73,10 @@ vec3 hashColour(uint patch_id, uint triangle) {
     vec3 ramp = clamp(abs(fract(hue + vec3(0.0, 2.0, 1.0) / 3.0) * 6.0 - 3.0) - 1.0, 0.0, 1.0);
     return linearFromSrgb(value * (1.0 - saturation * (1.0 - ramp)));
 }
-
 vec3 baseColour() {
-    vec3 patch_colour = uintBitsToFloat(patch_words.xyz);
-    if (show == kTriangles) return hashColour(patch_words.x, uint(gl_PrimitiveID));
-#ifdef ATTRIBUTES
-    if (show == kScalar) {
-        int last = textureSize(scalar_colours, 0) - 1;
-        float t = clamp(AT_PLACE(vertex_value).x, 0.0, 1.0);
-        return textureLod(scalar_colours, (t * last + 0.5) / (last + 1), 0.0).rgb;
-    }
-    vec3 colour_there = max(AT_PLACE(vertex_value), 0.0);
-    return show == kShaded ? patch_colour * colour_there : colour_there;
-#else
-    return patch_colour;
-#endif
+    return hashColour(patch_words.x, uint(gl_PrimitiveID));
 }
+#endif
 
 vec3 lit(vec3 n, vec3 eye, vec3 base) {
     float key = max(dot(n, light), 0.0);
@@ -81,27 +88,30 @@ vec3 lit(vec3 n, vec3 eye, vec3 base) {
     return received * base + shine * SHINE;
 }
 
+vec3 unitOrZero(vec3 v) {
+    float square = dot(v, v);
+    return v * (square > 0.0 ? inversesqrt(square) : 0.0);
+}
+
 void main() {
-    // Towards the eye, from the pixel's centre whichever samples are covered.
-    vec2 place = floor(gl_FragCoord.xy) + 0.5 - centre;
-    vec3 eye = normalize(vec3(vec2(-place.x, place.y) * inv_focal, 1.0));
 #if SAMPLES > 1
     findPlace();
 #endif
-    vec3 n = AT_PLACE(view_normal);
-    float square = dot(n, n);
-    n *= square > 0.0 ? inversesqrt(square) : 0.0;
+#if LIGHT == UNLIT
+    colour = vec4(baseColour(), 1.0);
+#else
+    // Towards the eye, from the pixel's centre whichever samples are covered.
+    vec2 place = floor(gl_FragCoord.xy) + 0.5 - centre;
+    vec3 eye = normalize(vec3(vec2(-place.x, place.y) * inv_focal, 1.0));
+    vec3 n = unitOrZero(AT_PLACE(view_normal));
     // Near a silhouette normals point away from faces that are seen: only a normal that is clearly
     // wrong is turned round on a front.
     float limit = gl_FrontFacing ? -0.25 : 0.0;
     if ((patch_words.w & kBothSides) != 0u && dot(n, eye) < limit) n = -n;
-
-    vec3 result;
-    if (show == kNormals)
-        result = linearFromSrgb(n * 0.5 + 0.5);
-    else if (show == kColour)
-        result = baseColour();
-    else
-        result = lit(n, eye, baseColour());
-    colour = vec4(result, 1.0);
+#if LIGHT == NORMALS
+    colour = vec4(linearFromSrgb(n * 0.5 + 0.5), 1.0);
+#else
+    colour = vec4(lit(n, eye, baseColour()), 1.0);
+#endif
+#endif
 }

@@ -27,8 +27,8 @@ out gl_PerVertex {
     float gl_ClipDistance[1];
 };
 out vec3 view_normal;
-flat out uvec4 patch_words;  // colour, or the id in Show::kTriangles; flags
-#ifdef ATTRIBUTES
+flat out uvec4 patch_words;  // colour, or the id for TRIANGLE_COLOUR; flags
+#ifdef HAS_VERTEX_VALUE
 out vec3 vertex_value;  // the colour in linear light, or the scalar's place in its range
 #endif
 
@@ -55,9 +55,11 @@ void main() {
     vec3 n = unitNormal();
     view_normal = vec3(dot(n, right.xyz), dot(n, up.xyz), -dot(n, forward.xyz));
     patch_words = uvec4(floatBitsToUint(draw.colour), draw.flags);
-    if (show == kTriangles) patch_words.x = draw.id;
-#ifdef ATTRIBUTES
-    vertex_value = show == kScalar ? vec3((vertex_scalar - scalar_range.x) * scalar_range.y)
-                                : linearFromSrgb(vertex_colour.rgb);
+#if BASE == TRIANGLE_COLOUR
+    patch_words.x = draw.id;
+#elif BASE == VERTEX_COLOUR
+    vertex_value = linearFromSrgb(vertex_colour.rgb);
+#elif BASE == SCALAR_COLOUR
+    vertex_value = vec3((vertex_scalar - scalar_range.x) * scalar_range.y);
 #endif
 }

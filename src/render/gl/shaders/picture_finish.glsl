@@ -2,7 +2,7 @@
 // buffer means: FinishBlock of frame_block.h.
 layout(std140, binding = 1) uniform Finish {
     float reference;  // depth in input units times what the depth buffer holds; which is 0 where nothing is
-    int show_depth;
+    float padding;
     ivec2 size;
 };
 #if SAMPLES == 1
