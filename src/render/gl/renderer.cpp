@@ -352,6 +352,8 @@ void GlRenderer::State::finish() {
 
 GlRenderer::GlRenderer(const PictureSize& size, int samples, size_t vram_bytes) {
     CHECK_LE(kLeastVramBytes, vram_bytes);
+    while (glGetError() != GL_NO_ERROR) {  // of others
+    }
     state_ = std::make_unique<State>(size, samples, vram_bytes);
 }
 

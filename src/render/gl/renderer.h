@@ -55,8 +55,8 @@ inline constexpr size_t kLeastVramBytes = size_t(1) << 19;
 class GlRenderer {
 public:
     /// `samples`: 1 at the pixel's centre, or 4 where the driver has them, shaded once a pixel and
-    /// triangle. At least kLeastVramBytes of memory; what the driver does not have shows as
-    /// MemoryError.
+    /// triangle. At least kLeastVramBytes of memory; of more than 8 GiB the rest is not used. What
+    /// the driver does not have shows as MemoryError.
     GlRenderer(const PictureSize& size, int samples, size_t vram_bytes);
     ~GlRenderer();
     GlRenderer(const GlRenderer&) = delete;

@@ -1,5 +1,7 @@
 #include "render/gl/renderer.h"
 
+#include <epoxy/egl.h>
+#include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -428,6 +430,65 @@ TEST_F(GlRendererTest, EmptyPicturesAreTheBackgroundAndSizesMayChange) {
             expectSame(drawOnGpu(renderer, scene, settings), drawOnCpu(scene, 4, settings),
                        std::to_string(size.width));
         }
+    }
+}
+
+/// A surface to make current, as a window has.
+class Surface {
+public:
+    explicit Surface(const PictureSize& size) {
+        const EGLint wanted[] = {EGL_SURFACE_TYPE,
+                                 EGL_PBUFFER_BIT,
+                                 EGL_RENDERABLE_TYPE,
+                                 EGL_OPENGL_BIT,
+                                 EGL_RED_SIZE,
+                                 8,
+                                 EGL_GREEN_SIZE,
+                                 8,
+                                 EGL_BLUE_SIZE,
+                                 8,
+                                 EGL_NONE};
+        EGLConfig config = nullptr;
+        EGLint count = 0;
+        if (eglChooseConfig(display_, wanted, &config, 1, &count) != EGL_TRUE || count == 0) return;
+        const EGLint extent[] = {EGL_WIDTH, size.width, EGL_HEIGHT, size.height, EGL_NONE};
+        surface_ = eglCreatePbufferSurface(display_, config, extent);
+    }
+    ~Surface() {
+        use(EGL_NO_SURFACE);
+        if (surface_ != EGL_NO_SURFACE) eglDestroySurface(display_, surface_);
+    }
+    bool makeCurrent() { return surface_ != EGL_NO_SURFACE && use(surface_); }
+
+private:
+    bool use(EGLSurface surface) {
+        return eglMakeCurrent(display_, surface, surface, context_) == EGL_TRUE;
+    }
+    EGLDisplay display_ = eglGetCurrentDisplay();
+    EGLContext context_ = eglGetCurrentContext();
+    EGLSurface surface_ = EGL_NO_SURFACE;
+};
+
+TEST_F(GlRendererTest, PresentsThePictureInAWindow) {
+    const Scene scene = variedScene();
+    Surface surface(scene.size);
+    if (!surface.makeCurrent()) GTEST_SKIP() << "no surface that a window could be";
+    const GlContext adopted = GlContext::adoptCurrent();
+    for (const int samples : {1, 4}) {
+        GlRenderer renderer(scene.size, samples, kVram);
+        const Picture picture = drawOnGpu(renderer, scene, {});
+        renderer.present();
+        std::vector<Rgba8> shown(picture.pixelCount());
+        glReadPixels(0, 0, scene.size.width, scene.size.height, GL_RGBA, GL_UNSIGNED_BYTE,
+                     shown.data());
+        size_t different = 0;
+        for (int y = 0; y < scene.size.height; ++y)
+            for (int x = 0; x < scene.size.width; ++x) {
+                const Rgba8 &a = picture.colour[picture.index(x, y)],
+                            &b = shown[picture.index(x, scene.size.height - 1 - y)];
+                different += a.r != b.r || a.g != b.g || a.b != b.b;
+            }
+        EXPECT_EQ(different, 0u);
     }
 }
 

@@ -1,6 +1,10 @@
 #include "render/gl/upload_ring.h"
 
+#include <fmt/format.h>
+
 #include "base/check.h"
+#include "base/error.h"
+#include "base/text.h"
 
 namespace pietra {
 namespace {
@@ -18,7 +22,8 @@ UploadRing::UploadRing(size_t bytes) : bytes_(bytes) {
     glNamedBufferStorage(buffer_, GLsizeiptr(bytes), nullptr, kAccess);
     memory_ =
         static_cast<std::byte*>(glMapNamedBufferRange(buffer_, 0, GLsizeiptr(bytes), kAccess));
-    CHECK(memory_ != nullptr);
+    if (memory_ == nullptr)
+        throw MemoryError(fmt::format("the driver maps no {} of memory", formatBytes(bytes)));
 }
 
 UploadRing::~UploadRing() {

@@ -17,7 +17,7 @@ struct RingSpace {
 
 class UploadRing {
 public:
-    /// `bytes`: a multiple of 2048.
+    /// `bytes`: a multiple of 2048. Throws MemoryError where the driver has none.
     explicit UploadRing(size_t bytes);
     ~UploadRing();
     UploadRing(const UploadRing&) = delete;

@@ -16,9 +16,9 @@ layout(location = 0) out vec4 colour;
 // opposite ones, the centre is inside; with one, or two neighbours, the triangle's edge may lie
 // anywhere between.
 #if SAMPLES == 1
-#define AT_PLACE(input) input
+#define AT_PLACE(value) value
 #else
-#define AT_PLACE(input) interpolateAtOffset(input, place_offset)
+#define AT_PLACE(value) interpolateAtOffset(value, place_offset)
 vec2 place_offset;
 void findPlace() {
     const vec2 kSample[4] = vec2[4](vec2(-0.125, -0.375), vec2(0.375, -0.125),
