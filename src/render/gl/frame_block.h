@@ -10,7 +10,9 @@ namespace pietra {
 
 /// Binding points.
 inline constexpr uint32_t kFrameBinding = 0, kFinishBinding = 1;  // uniform blocks
-inline constexpr uint32_t kDrawsBinding = 0;                      // storage block
+inline constexpr uint32_t kDrawsBinding = 0, kCullBinding = 1, kCommandsBinding = 2,
+                          kSeenBinding = 3, kFoundBinding = 4, kLastBinding = 5,
+                          kNowBinding = 6;  // storage blocks
 inline constexpr uint32_t kScalarColoursUnit = 0, kColourUnit = 1, kDepthUnit = 2,
                           kBackgroundUnit = 3, kRangeUnit = 4;
 

@@ -17,14 +17,15 @@ VertexLayout layoutOf(const Mesh& mesh) {
     return {!mesh.colour.empty(), uint32_t(mesh.scalar.size() / vertices)};
 }
 
-Vec3i cornerOf(const Mesh& mesh) {
+void findBox(const Mesh& mesh, PatchRange& range) {
     Vec3i low = mesh.position[0], high = low;
     for (const Vec3i& p : mesh.position) {
         low = glm::min(low, p);
         high = glm::max(high, p);
     }
     for (int k = 0; k < 3; ++k) CHECK_LT(int64_t(high[k]) - low[k], int64_t(1) << kLatticeBits);
-    return low;
+    range.corner = low;
+    range.extent = high - low;
 }
 
 }  // namespace
@@ -42,7 +43,7 @@ PageShape shapeOf(std::span<const Mesh> patches) {
         CHECK(layout == shape.layout);
         first = false;
         PatchRange& range = shape.patches[i];
-        range.corner = cornerOf(mesh);
+        findBox(mesh, range);
         range.first_vertex = uint32_t(vertices);
         range.vertices = uint32_t(mesh.vertexCount());
         range.indices = uint32_t(3 * mesh.triangleCount());

@@ -26,7 +26,7 @@ struct VertexLayout {
 
 /// A patch within its page.
 struct PatchRange {
-    Vec3i corner{0, 0, 0};
+    Vec3i corner{0, 0, 0}, extent{0, 0, 0};  ///< of its box
     uint32_t first_vertex = 0, vertices = 0;
     uint32_t index_offset = 0;  ///< bytes from the first vertex of the page, a multiple of 4
     uint32_t indices = 0;

@@ -81,7 +81,7 @@ bool PageStore::upload(PageKey key, std::span<const Mesh> patches) {
     StoredPage page{*block, shape.layout, {}};
     for (const PatchRange& range : shape.patches) {
         const size_t index_begin = begin + range.index_offset;
-        page.patches.push_back({range.corner, range.indices,
+        page.patches.push_back({range.corner, range.extent, range.indices,
                                 uint32_t(index_begin / (range.wide ? 4 : 2)),
                                 int32_t(begin / stride + range.first_vertex), range.wide});
     }

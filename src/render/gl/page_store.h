@@ -26,11 +26,12 @@ struct PageKey {
 
 /// A patch as glMultiDrawElementsIndirect() takes it.
 struct StoredPatch {
-    Vec3i corner;
+    Vec3i corner, extent;  ///< of its box
     uint32_t indices;
     uint32_t first_index;
     int32_t base_vertex;
     bool wide;
+    size_t indexBegin() const { return size_t(first_index) * (wide ? 4 : 2); }  ///< in the buffer
 };
 
 struct StoredPage {

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/text.h"
 #include "render/gl/frame_block.h"
+#include "render/gl/occlusion.h"
 #include "render/gl/program.h"
 #include "render/gl/targets.h"
 #include "render/gl/upload_ring.h"
@@ -27,6 +28,11 @@ constexpr size_t kLargestRing = size_t(1) << 24;
 
 size_t ringBytes(size_t vram_bytes) {
     return std::min(vram_bytes / 8, kLargestRing) / 2048 * 2048;
+}
+
+bool isLlvmpipe() {
+    const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+    return name != nullptr && std::string_view(name).find("llvmpipe") != std::string_view::npos;
 }
 
 std::string lightDefines() {
@@ -147,9 +153,14 @@ struct GlRenderer::State {
     std::array<GlProgram, kLooks> programs;
     GlTexture scalar_colours;
     GlVertexArray vertex_array;
-    GlQuery timer[2];
+    OcclusionCuller culler;
+    /// Times of a picture's begin and end, of two pictures in turn.
+    struct Timer {
+        GlQuery begin, end;
+        bool running = false;
+    };
+    Timer timer[2];
     int current_timer = 0;
-    bool timed[2] = {false, false};
 
     std::optional<Projection> projection;
     FrameBlock frame{};
@@ -157,17 +168,24 @@ struct GlRenderer::State {
     double focal_px = 0;
     bool drawing = false;  // between begin() and finish()
     uint64_t uploaded_before = 0;
+    size_t last_culled = 0;  // draws of the culler's last use
     GlStatistics statistics;
     std::vector<QueuedDraw> queue;  // of one draw(), kept for its memory
 
     State(const PictureSize& size, int samples, size_t vram_bytes);
     void beginTimer();
-    void readTimer(int which);
+    void readTimer(Timer& timer);
     void setModel(const View& view, const Lattice& lattice);
     void setState() const;
     static void leaveState();
     void enqueue(std::span<const GlItem> items);
-    void submit(std::span<const GlItem> items, std::span<const QueuedDraw> chunk);
+    size_t drawsAtATime() const;
+    void drawInChunks(std::span<const GlItem> items, bool cull);
+    void submit(std::span<const GlItem> items, std::span<const QueuedDraw> chunk, bool cull);
+    void drawCommands(std::span<const GlItem> items, std::span<const QueuedDraw> chunk,
+                      GLuint buffer, GLintptr offset);
+    void provideBoxes(std::span<const GlItem> items, std::span<const QueuedDraw> chunk);
+    CullRecord boxOf(const StoredPatch& patch) const;
     void bindGroup(const DrawGroup& group);
     DrawRecord recordOf(const GlItem& item, const QueuedDraw& draw) const;
     void finish();
@@ -179,32 +197,35 @@ GlRenderer::State::State(const PictureSize& size, int samples, size_t vram_bytes
       targets(size, samples),
       programs(makeDrawPrograms(samples)),
       scalar_colours(makeScalarColours()),
-      vertex_array(makeVertexArray(pages.buffer())) {
-    GLuint names[2];
-    glGenQueries(2, names);
-    for (int i = 0; i < 2; ++i) timer[i] = GlQuery(names[i]);
+      vertex_array(makeVertexArray(pages.buffer())),
+      culler(drawsAtATime(), pages.capacity(), isLlvmpipe()) {
+    GLuint names[4];
+    glCreateQueries(GL_TIMESTAMP, 4, names);
+    for (int i = 0; i < 2; ++i)
+        timer[i] = {GlQuery(names[2 * i]), GlQuery(names[2 * i + 1]), false};
     if (glGetError() == GL_OUT_OF_MEMORY)
         throw MemoryError(
             fmt::format("there are no {} of graphics memory", formatBytes(vram_bytes)));
 }
 
-void GlRenderer::State::readTimer(int which) {
-    if (!timed[which]) return;
+void GlRenderer::State::readTimer(Timer& t) {
+    if (!t.running) return;
     GLint done = 0;
-    glGetQueryObjectiv(timer[which], GL_QUERY_RESULT_AVAILABLE, &done);
+    glGetQueryObjectiv(t.end, GL_QUERY_RESULT_AVAILABLE, &done);
     if (done == 0) return;
-    GLuint64 ns = 0;
-    glGetQueryObjectui64v(timer[which], GL_QUERY_RESULT, &ns);
-    statistics.gpu_ms = double(ns) * 1e-6;
-    timed[which] = false;
+    GLuint64 begin_ns = 0, end_ns = 0;
+    glGetQueryObjectui64v(t.begin, GL_QUERY_RESULT, &begin_ns);
+    glGetQueryObjectui64v(t.end, GL_QUERY_RESULT, &end_ns);
+    statistics.gpu_ms = double(end_ns - begin_ns) * 1e-6;
+    t.running = false;
 }
 
 void GlRenderer::State::beginTimer() {
-    readTimer(current_timer);
+    readTimer(timer[current_timer]);
     current_timer ^= 1;
-    readTimer(current_timer);
-    timed[current_timer] = true;
-    glBeginQuery(GL_TIME_ELAPSED, timer[current_timer]);
+    readTimer(timer[current_timer]);
+    timer[current_timer].running = false;
+    glQueryCounter(timer[current_timer].begin, GL_TIMESTAMP);
 }
 
 void GlRenderer::State::setModel(const View& view, const Lattice& lattice) {
@@ -241,10 +262,8 @@ void GlRenderer::State::setState() const {
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
     glFrontFace(GL_CW);  // y is turned down
     glCullFace(GL_BACK);
-    glBindVertexArray(vertex_array);
     glBindTextureUnit(kScalarColoursUnit, scalar_colours);
     glBindSampler(kScalarColoursUnit, 0);
-    glBindBuffer(GL_DRAW_INDIRECT_BUFFER, ring.buffer());
 }
 
 void GlRenderer::State::leaveState() {
@@ -309,11 +328,61 @@ void GlRenderer::State::bindGroup(const DrawGroup& group) {
                  group.layout.scalarOffset() + 4 * uint32_t(settings.scalar_index));
 }
 
-/// The lists of `chunk` through the ring, and a call for each group in it.
-void GlRenderer::State::submit(std::span<const GlItem> items, std::span<const QueuedDraw> chunk) {
+/// The patch's box with room around it for what rounding moves: 1/64 pixel, and a lattice unit.
+CullRecord GlRenderer::State::boxOf(const StoredPatch& patch) const {
+    const Vec3f low(patch.corner - projection->origin), size(patch.extent);
+    const Vec3f& forward = projection->forward;
+    float nearest = 0, farthest = 0;
+    for (int k = 0; k < 3; ++k) {
+        const float a = low[k] * forward[k], b = (low[k] + size[k]) * forward[k];
+        nearest += std::min(a, b);
+        farthest += std::max(a, b);
+    }
+    const auto room = int32_t(std::max(farthest, 0.0f) * frame.inv_focal / 64) + 2;
+    // Near the eye, which may be inside, the faces are cut away: no test. What is behind it is not
+    // in sight.
+    const bool always = nearest < 4.0f * float(room) && farthest > -4.0f * float(room);
+    return {patch.corner - projection->origin - room,
+            uint32_t(patch.indexBegin() / OcclusionCuller::kSlotBytes), patch.extent + 2 * room,
+            always};
+}
+
+void GlRenderer::State::provideBoxes(std::span<const GlItem> items,
+                                     std::span<const QueuedDraw> chunk) {
+    const RingSpace space = ring.take(chunk.size() * sizeof(CullRecord), 256);
+    for (size_t i = 0; i < chunk.size(); ++i) {
+        const CullRecord record = boxOf(chunk[i].patch(items[chunk[i].item]));
+        std::memcpy(space.memory + i * sizeof(record), &record, sizeof(record));
+    }
+    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, kCullBinding, ring.buffer(), space.offset,
+                      GLsizeiptr(chunk.size() * sizeof(CullRecord)));
+}
+
+/// A call for each group of draws.
+void GlRenderer::State::drawCommands(std::span<const GlItem> items,
+                                     std::span<const QueuedDraw> chunk, GLuint buffer,
+                                     GLintptr offset) {
+    glBindVertexArray(vertex_array);
+    glBindBuffer(GL_DRAW_INDIRECT_BUFFER, buffer);
+    for (size_t begin = 0, end = 0; begin < chunk.size(); begin = end) {
+        const QueuedDraw& first = chunk[begin];
+        while (end < chunk.size() && chunk[end].group == first.group) ++end;
+        const bool wide = first.patch(items[first.item]).wide;
+        const bool culled = items[first.item].one_sided && !settings.two_sided;
+        bindGroup({culled, wide, first.page->layout});
+        glMultiDrawElementsIndirect(
+            GL_TRIANGLES, wide ? GL_UNSIGNED_INT : GL_UNSIGNED_SHORT,
+            reinterpret_cast<const void*>(offset + GLintptr(begin * sizeof(DrawCommand))),
+            GLsizei(end - begin), 0);
+    }
+}
+
+/// The lists of `chunk` through the ring, and the calls that draw by them.
+void GlRenderer::State::submit(std::span<const GlItem> items, std::span<const QueuedDraw> chunk,
+                               bool cull) {
     const RingSpace block = ring.take(sizeof(FrameBlock), 256);
     const RingSpace records = ring.take(chunk.size() * sizeof(DrawRecord), 256);
-    const RingSpace commands = ring.take(chunk.size() * sizeof(DrawCommand), 4);
+    const RingSpace commands = ring.take(chunk.size() * sizeof(DrawCommand), 256);
     std::memcpy(block.memory, &frame, sizeof(frame));
     for (size_t i = 0; i < chunk.size(); ++i) {
         const GlItem& item = items[chunk[i].item];
@@ -328,24 +397,42 @@ void GlRenderer::State::submit(std::span<const GlItem> items, std::span<const Qu
                       sizeof(FrameBlock));
     glBindBufferRange(GL_SHADER_STORAGE_BUFFER, kDrawsBinding, ring.buffer(), records.offset,
                       GLsizeiptr(chunk.size() * sizeof(DrawRecord)));
-    for (size_t begin = 0, end = 0; begin < chunk.size(); begin = end) {
-        const QueuedDraw& first = chunk[begin];
-        while (end < chunk.size() && chunk[end].group == first.group) ++end;
-        const bool wide = first.patch(items[first.item]).wide;
-        const bool culled = items[first.item].one_sided && !settings.two_sided;
-        bindGroup({culled, wide, first.page->layout});
-        glMultiDrawElementsIndirect(
-            GL_TRIANGLES, wide ? GL_UNSIGNED_INT : GL_UNSIGNED_SHORT,
-            reinterpret_cast<const void*>(commands.offset + begin * sizeof(DrawCommand)),
-            GLsizei(end - begin), 0);
+    if (cull) {
+        glBindBufferRange(GL_SHADER_STORAGE_BUFFER, kCommandsBinding, ring.buffer(),
+                          commands.offset, GLsizeiptr(chunk.size() * sizeof(DrawCommand)));
+        provideBoxes(items, chunk);
+        culler.begin(chunk.size());
+        drawCommands(items, chunk, culler.seen(), 0);
+        culler.end(chunk.size());
+        drawCommands(items, chunk, culler.found(), 0);
+        last_culled = chunk.size();
+    } else {
+        drawCommands(items, chunk, ring.buffer(), commands.offset);
     }
     ring.used();
+}
+
+/// Their lists, and what aligning them may cost, fit the ring.
+size_t GlRenderer::State::drawsAtATime() const {
+    return (ring.largest() - 2048) /
+           (sizeof(DrawRecord) + sizeof(DrawCommand) + sizeof(CullRecord));
+}
+
+void GlRenderer::State::drawInChunks(std::span<const GlItem> items, bool cull) {
+    CHECK(drawing);
+    enqueue(items);
+    setState();
+    const size_t chunk = drawsAtATime();
+    const std::span<const QueuedDraw> all(queue);
+    for (size_t begin = 0; begin < all.size(); begin += chunk)
+        submit(items, all.subspan(begin, std::min(chunk, all.size() - begin)), cull);
 }
 
 void GlRenderer::State::finish() {
     if (!drawing) return;
     targets.finish(reference, settings.show == Show::kDepth, ring);
-    glEndQuery(GL_TIME_ELAPSED);
+    glQueryCounter(timer[current_timer].end, GL_TIMESTAMP);
+    timer[current_timer].running = true;
     leaveState();
     drawing = false;
 }
@@ -393,7 +480,6 @@ void GlRenderer::resize(const PictureSize& size) {
 
 void GlRenderer::begin(const View& view, const Lattice& lattice, const ShadeSettings& settings) {
     State& s = *state_;
-    if (s.drawing) glEndQuery(GL_TIME_ELAPSED);
     s.settings = settings;
     s.reference = kNearDepth / kDepthRoom * float(lattice.step);
     s.focal_px = view.focal_px();
@@ -410,15 +496,15 @@ void GlRenderer::setModel(const View& view, const Lattice& lattice) {
 }
 
 void GlRenderer::draw(std::span<const GlItem> items) {
-    State& s = *state_;
-    CHECK(s.drawing);
-    s.enqueue(items);
-    s.setState();
-    // A chunk's lists, and what aligning them may cost, fit the ring.
-    const size_t chunk = (s.ring.largest() - 1024) / (sizeof(DrawRecord) + sizeof(DrawCommand));
-    const std::span<const QueuedDraw> queue(s.queue);
-    for (size_t begin = 0; begin < queue.size(); begin += chunk)
-        s.submit(items, queue.subspan(begin, std::min(chunk, queue.size() - begin)));
+    state_->drawInChunks(items, false);
+}
+
+void GlRenderer::drawUnhidden(std::span<const GlItem> items) {
+    state_->drawInChunks(items, true);
+}
+
+size_t GlRenderer::countUnhidden() const {
+    return state_->culler.countDrawn(state_->last_culled);
 }
 
 void GlRenderer::finish() {

@@ -83,6 +83,13 @@ public:
     /// is the same camera in its coordinates.
     void setModel(const View& view, const Lattice& lattice);
     void draw(std::span<const GlItem> items);
+    /// Draws the same, but leaves out on the GPU what is hidden (occlusion.h), by what is drawn
+    /// already or by each other: for the frames of a flight, where most that is seen was seen
+    /// before. No pixel changes but where surfaces coincide.
+    void drawUnhidden(std::span<const GlItem> items);
+    /// Of the patches that it drew last at a time, a call's if they are few, how many were not left
+    /// out. Waits for the GPU: not for frames.
+    size_t countUnhidden() const;
     /// Completes the picture, without waiting for it. Nothing can be drawn before the next begin().
     void finish();
     /// Completes the picture and waits for it.

@@ -396,6 +396,100 @@ TEST_F(GlRendererTest, PagesComeAndGoInScarceMemory) {
     EXPECT_EQ(renderer.usedBytes(), 0u);
 }
 
+/// A flight over a landscape of ridges and through a closed ball, in many patches that come and go.
+TEST_F(GlRendererTest, LeavingOutWhatIsHiddenChangesNoPixel) {
+    Scene scene;
+    std::mt19937 random(3);
+    for (const auto& [mesh, one_sided] : {std::pair(terrain(80, 70, 4000, 1500), false),
+                                          std::pair(sphere({2500, 2500, 700}, 500, 60, 40), true)})
+        for (size_t begin = 0; begin < mesh.triangleCount(); begin += 60)
+            scene.add(part(mesh, begin, std::min(begin + 60, mesh.triangleCount())), one_sided);
+    scene.size = {160, 128};
+    std::vector<GlItem> items = itemsOf(scene);
+    for (const int samples : {1, 4}) {
+        GlRenderer plain(scene.size, samples, kVram), culling(scene.size, samples, kVram);
+        for (uint32_t i = 0; i < items.size(); ++i)
+            for (GlRenderer* renderer : {&plain, &culling})
+                ASSERT_TRUE(renderer->upload(items[i].key, {scene.patches[i].mesh, 1}));
+        size_t submitted = 0, drawn = 0;
+        for (int frame = 0; frame < 24; ++frame) {
+            // Small steps, a jump now and then, some of the patches missing.
+            const double t = frame * 0.04 + (frame / 8) * 0.3;
+            scene.look({300 + 2800 * t, 100 + 2500 * t, 1400 - 500 * t},
+                       {2600 + 500 * t, 2500, 600 + 300 * std::sin(9 * t)}, 70);
+            std::shuffle(items.begin(), items.end(), random);
+            const auto list = std::span(items).first(items.size() - size_t(frame % 5) * 20);
+            plain.begin(scene.view(), Lattice{}, {});
+            plain.draw(list);
+            culling.begin(scene.view(), Lattice{}, {});
+            culling.drawUnhidden(list);
+            submitted += list.size();
+            drawn += culling.countUnhidden();
+            const Picture expected = plain.readPicture(), picture = culling.readPicture();
+            expectSame(picture, expected, "frame " + std::to_string(frame));
+        }
+        EXPECT_LT(drawn, submitted * 4 / 5);
+    }
+}
+
+/// Uploads a scene's meshes and draws it again and again; the pictures must be those of draw().
+class Watcher {
+public:
+    explicit Watcher(Scene& scene)
+        : scene_(scene), items_(itemsOf(scene)), renderer_(scene.size, 1, kVram) {
+        for (uint32_t i = 0; i < items_.size(); ++i)
+            EXPECT_TRUE(renderer_.upload(items_[i].key, {scene.patches[i].mesh, 1}));
+    }
+    /// How many patches were drawn.
+    size_t look(const Vec3d& eye, const Vec3d& target) {
+        scene_.look(eye, target, 60);
+        renderer_.begin(scene_.view(), Lattice{}, {});
+        renderer_.drawUnhidden(items_);
+        const Picture picture = renderer_.readPicture();
+        const size_t drawn = renderer_.countUnhidden();
+        renderer_.begin(scene_.view(), Lattice{}, {});
+        renderer_.draw(items_);
+        expectSame(picture, renderer_.readPicture(), "unhidden");
+        return drawn;
+    }
+
+private:
+    Scene& scene_;
+    std::vector<GlItem> items_;
+    GlRenderer renderer_;
+};
+
+TEST_F(GlRendererTest, WhatAWallHidesIsNotDrawn) {
+    Scene scene;
+    scene.add(grid(4, 4, [](double u, double v) {  // y = 0
+        return Vec3d(2000 * u - 1000, 0, 2000 * v - 1000);
+    }));
+    for (int i = 0; i < 20; ++i) scene.add(sphere({40.0 * i - 400, 300, 0}, 30, 8, 6));
+    Watcher watcher(scene);
+    const Vec3d before(0, -1500, 0), behind(100, 1500, 0), centre(0, 0, 0);
+    EXPECT_EQ(watcher.look(before, centre), 21u);  // nobody knows yet
+    EXPECT_EQ(watcher.look(before, centre), 21u);  // drawn as they were seen, and found hidden
+    EXPECT_EQ(watcher.look(before, centre), 1u);
+    EXPECT_EQ(watcher.look(behind, centre), 21u);
+    EXPECT_EQ(watcher.look(before, centre), 21u);
+    EXPECT_EQ(watcher.look(before, centre), 1u);
+    EXPECT_EQ(watcher.look(before, {0, -3000, 0}), 1u);  // out of the picture
+    EXPECT_EQ(watcher.look(before, {0, -3000, 0}), 0u);
+}
+
+TEST_F(GlRendererTest, APatchWhoseBoxHoldsTheEyeIsDrawn) {
+    // The faces of its box that are in front are behind a wall; the patch itself is not.
+    Scene scene;
+    scene.add(grid(
+        2, 2, [](double u, double v) { return Vec3d(6000 * u - 3000, 400, 6000 * v - 3000); }));
+    scene.add(grid(8, 8, [](double u, double v) {
+        const double x = 6000 * u - 3000;
+        return Vec3d(x, 6000 * v - 3000, x - 150);
+    }));
+    Watcher watcher(scene);
+    for (int i = 0; i < 4; ++i) EXPECT_EQ(watcher.look({0, 0, 0}, {0, 100, -20}), 2u);
+}
+
 TEST_F(GlRendererTest, WhatIsReleasedStaysInThePicture) {
     const Scene scene = variedScene();
     GlRenderer renderer(scene.size, 1, kVram);
