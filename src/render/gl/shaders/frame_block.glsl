@@ -10,7 +10,7 @@ layout(std140, binding = 0) uniform Frame {
     vec2 scalar_range;        // lowest value, 1 / range
 };
 
-// What programs are made for: see Look of renderer.cpp.
+// What programs are made for: see Look of draw_programs.h.
 #define PATCH_COLOUR 0
 #define VERTEX_COLOUR 1
 #define TRIANGLE_COLOUR 2
