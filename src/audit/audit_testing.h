@@ -37,17 +37,17 @@ inline MemorySource sourceOf(const ToyTerrain& model, const Lattice& lattice, do
     MemorySource source;
     for (const NodeIndex i : finestCut(model.nodes).nodes) {
         const Mesh& mesh = model.patches[i];
-        const uint64_t base = source.position_.size();
+        const uint64_t base = source.vertices.position.size();
         for (const Vec3i& p : mesh.position) {
             // The same for all that are at this point.
             const uint64_t bits = mixBits(latticeKey(p));
             const Vec3d offset(double(bits & 1023) / 1023 - 0.5,
                                double(bits >> 10 & 1023) / 1023 - 0.5,
                                double(bits >> 20 & 1023) / 1023 - 0.5);
-            source.position_.push_back(lattice.toInput(Vec3d(p) + offset * jitter));
+            source.vertices.position.push_back(lattice.toInput(Vec3d(p) + offset * jitter));
         }
         for (const Triangle& t : mesh.triangle)
-            source.triangle_.push_back({base + t[0], base + t[1], base + t[2]});
+            source.triangles.push_back({base + t[0], base + t[1], base + t[2]});
     }
     return source;
 }

@@ -245,8 +245,7 @@ void toLattice(std::span<const InputTriangles::Corners> input, const Lattice& la
                std::vector<TriangleCorners>& out) {
     out.clear();
     for (const InputTriangles::Corners& t : input) {
-        const Vec3i a = snapToLattice(lattice, t[0]), b = snapToLattice(lattice, t[1]),
-                    c = snapToLattice(lattice, t[2]);
+        const Vec3i a = lattice.snap(t[0]), b = lattice.snap(t[1]), c = lattice.snap(t[2]);
         if (a == b || b == c || c == a) continue;
         out.push_back({lattice.toLattice(t[0]), lattice.toLattice(t[1]), lattice.toLattice(t[2])});
     }

@@ -26,7 +26,7 @@
 
 #include "audit/input_triangles.h"
 #include "audit/patch_stream.h"
-#include "audit/triangle_distance.h"
+#include "geometry/triangle_distance.h"
 #include "base/budget.h"
 #include "multires/cut.h"
 

@@ -24,61 +24,6 @@ std::vector<CertificateReport> auditToFinest(const ToyTerrain& model, std::span<
                             options, budget);
 }
 
-/// The same distance by other means: barycentric coordinates from the normal equations, else the
-/// nearest of three segments, in long double.
-double slowDistance(const Vec3d& p, const TriangleCorners& t) {
-    using V = glm::vec<3, long double>;
-    const V q(p), a(t[0]), u = V(t[1]) - a, v = V(t[2]) - a, w = q - a;
-    const long double uu = glm::dot(u, u), uv = glm::dot(u, v), vv = glm::dot(v, v);
-    const long double det = uu * vv - uv * uv;
-    if (det > 0) {
-        const long double s = (glm::dot(w, u) * vv - glm::dot(w, v) * uv) / det;
-        const long double r = (glm::dot(w, v) * uu - glm::dot(w, u) * uv) / det;
-        if (s >= 0 && r >= 0 && s + r <= 1) return double(glm::length(w - s * u - r * v));
-    }
-    long double best = 1e30L;
-    for (int k = 0; k < 3; ++k) {
-        const V from(t[k]), edge = V(t[(k + 1) % 3]) - from;
-        const long double length_sq = glm::dot(edge, edge);
-        const long double f =
-            length_sq > 0 ? std::clamp(glm::dot(q - from, edge) / length_sq, 0.0L, 1.0L) : 0.0L;
-        best = std::min(best, glm::length(q - from - f * edge));
-    }
-    return double(best);
-}
-
-TEST(TriangleDistance, agreesWithANotherWay) {
-    std::mt19937 random(1);
-    const auto integer = [&](int range) { return double(int(random() % unsigned(range))); };
-    for (int trial = 0; trial < 30000; ++trial) {
-        const int size = 1 << (trial % 21);
-        TriangleCorners t;
-        for (Vec3d& corner : t) corner = Vec3d(integer(size), integer(size), integer(size));
-        if (trial % 7 == 0) t[2] = t[1];                        // a segment
-        if (trial % 7 == 1) t[2] = t[0] + 2.0 * (t[1] - t[0]);  // collinear
-        if (trial % 7 == 2) t[2] = t[1] + Vec3d(1, 0, 0);       // a sliver
-        if (trial % 49 == 3) t[1] = t[2] = t[0];                // a point
-        const Vec3d p(integer(size) + 0.25, integer(2 * size), integer(size));
-        EXPECT_NEAR(TriangleDistance(t).distance(p), slowDistance(p, t), 1e-8);
-    }
-}
-
-TEST(TriangleDistance, staysGoodOnSliversOffTheLattice) {
-    std::mt19937 random(2);
-    std::uniform_real_distribution<double> uniform(0, 1);
-    for (int trial = 0; trial < 20000; ++trial) {
-        const Vec3d a(uniform(random) * 1e5, uniform(random) * 1e5, uniform(random) * 1e5);
-        const Vec3d along = 1000.0 * Vec3d(uniform(random), uniform(random), uniform(random));
-        const double height = std::pow(10.0, -12 * uniform(random));
-        const Vec3d c = a + uniform(random) * along + height * Vec3d(uniform(random), 0, 1);
-        const TriangleCorners t = {a, a + along, c};
-        const Vec3d p = a + uniform(random) * along + 3.0 * Vec3d(0, uniform(random), 1);
-        // No point of the triangle is further from an edge of it than the height.
-        const double to_edges = slowDistance(p, {t[0], t[1], t[1]});
-        EXPECT_NEAR(TriangleDistance(t).distance(p), to_edges, 3 * height + 1e-8);
-    }
-}
-
 TEST(SampleIndex, findsTheBestOfAllTriangles) {
     std::mt19937 random(3);
     std::uniform_real_distribution<double> uniform(0, 1);
@@ -182,7 +127,8 @@ TEST(Certificate, measuresWhatBruteForceMeasures) {
                     const Vec3d p =
                         t[0] + (t[1] - t[0]) * (double(i) / n) + (t[2] - t[0]) * (double(j) / n);
                     double d = 1e30;
-                    for (const TriangleCorners& other : to) d = std::min(d, slowDistance(p, other));
+                    for (const TriangleCorners& other : to)
+                        d = std::min(d, TriangleDistance(other).distance(p));
                     worst = std::max(worst, d);
                 }
         return worst;
@@ -342,19 +288,13 @@ TEST(InputTriangles, areTheSameFromMemoryAndFromTheFile) {
                 ASSERT_EQ(first, next);
                 for (const InputTriangles::Corners& corners : batch) {
                     for (int k = 0; k < 3; ++k)
-                        ASSERT_EQ(corners[k], source.position_[source.triangle_[next][k]]);
+                        ASSERT_EQ(corners[k], source.vertices.position[source.triangles[next][k]]);
                     ++next;
                 }
             });
-            EXPECT_EQ(next, source.triangle_.size());
+            EXPECT_EQ(next, source.triangles.size());
         }
     }
-}
-
-TEST(SnapToLattice, roundsToTheNearestPoint) {
-    const Lattice lattice{{100, -100, 0.5}, 0.25, 2};
-    EXPECT_EQ(snapToLattice(lattice, {100, -100, 0.5}), Vec3i(0, 0, 0));
-    EXPECT_EQ(snapToLattice(lattice, {100.49, -99.4, 2.6}), Vec3i(4, 4, 8));
 }
 
 }  // namespace

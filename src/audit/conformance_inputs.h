@@ -13,59 +13,9 @@
 #include <vector>
 
 #include "base/hash.h"
-#include "io/triangle_source.h"
+#include "io/memory_source.h"
 
 namespace pietra {
-
-/// A mesh in memory as an input.
-class MemorySource : public TriangleSource {
-public:
-    MemorySource() = default;
-    MemorySource(std::vector<Vec3d> positions, std::vector<std::array<uint64_t, 3>> triangles)
-        : position_(std::move(positions)), triangle_(std::move(triangles)) {}
-
-    const AttributeSchema& schema() const override { return schema_; }
-    uint64_t vertexCount() override { return position_.size(); }
-    uint64_t triangleCountHint() override { return triangle_.size(); }
-    uint64_t inputBytes() const override {
-        return position_.size() * sizeof(Vec3d) + triangle_.size() * sizeof(triangle_[0]);
-    }
-    bool cheapToReread() const override { return true; }
-    std::vector<std::string> notes() const override { return {}; }
-
-    void rewindVertices() override { next_vertex_ = 0; }
-    bool readVertices(VertexBatch& batch) override {
-        const size_t count = std::min<size_t>(1000, position_.size() - next_vertex_);
-        batch = {};
-        batch.first = next_vertex_;
-        batch.position.assign(position_.begin() + ptrdiff_t(next_vertex_),
-                              position_.begin() + ptrdiff_t(next_vertex_ + count));
-        next_vertex_ += count;
-        return count > 0;
-    }
-    void rewindTriangles() override { next_triangle_ = 0; }
-    bool readTriangles(TriangleBatch& batch) override {
-        const size_t count = std::min<size_t>(5000, triangle_.size() - next_triangle_);
-        batch.first = next_triangle_;
-        batch.triangle.assign(triangle_.begin() + ptrdiff_t(next_triangle_),
-                              triangle_.begin() + ptrdiff_t(next_triangle_ + count));
-        next_triangle_ += count;
-        return count > 0;
-    }
-    /// In an order without any locality.
-    void shuffleTriangles() {
-        std::sort(triangle_.begin(), triangle_.end(), [](const auto& a, const auto& b) {
-            return std::pair(mixBits(a[0] * 7 + a[1]), a) < std::pair(mixBits(b[0] * 7 + b[1]), b);
-        });
-    }
-
-    std::vector<Vec3d> position_;
-    std::vector<std::array<uint64_t, 3>> triangle_;
-
-private:
-    AttributeSchema schema_;
-    size_t next_vertex_ = 0, next_triangle_ = 0;
-};
 
 struct ConformanceInput {
     std::string name;
@@ -85,15 +35,15 @@ MemorySource sheet(int n, double roughness, Hole&& hole) {
     MemorySource mesh;
     for (int y = 0; y <= n; ++y)
         for (int x = 0; x <= n; ++x)
-            mesh.position_.push_back({double(x), double(y),
-                                      4 * std::sin(x * 0.21) * std::cos(y * 0.17) +
-                                          roughness * noise(uint64_t(x), uint64_t(y))});
+            mesh.vertices.position.push_back({double(x), double(y),
+                                              4 * std::sin(x * 0.21) * std::cos(y * 0.17) +
+                                                  roughness * noise(uint64_t(x), uint64_t(y))});
     const auto at = [n](int x, int y) { return uint64_t(y * (n + 1) + x); };
     for (int y = 0; y < n; ++y)
         for (int x = 0; x < n; ++x) {
             if (hole(x, y)) continue;
-            mesh.triangle_.push_back({at(x, y), at(x + 1, y), at(x + 1, y + 1)});
-            mesh.triangle_.push_back({at(x, y), at(x + 1, y + 1), at(x, y + 1)});
+            mesh.triangles.push_back({at(x, y), at(x + 1, y), at(x + 1, y + 1)});
+            mesh.triangles.push_back({at(x, y), at(x + 1, y + 1), at(x, y + 1)});
         }
     return mesh;
 }
@@ -103,11 +53,12 @@ inline MemorySource ball(int n, double roughness) {
     MemorySource mesh;
     std::map<std::array<int, 3>, uint64_t> index;
     const auto vertex = [&](const Vec3i& p) {
-        const auto [it, is_new] = index.try_emplace({p.x, p.y, p.z}, mesh.position_.size());
+        const auto [it, is_new] = index.try_emplace({p.x, p.y, p.z}, mesh.vertices.position.size());
         if (is_new) {
             const Vec3d direction = glm::normalize(Vec3d(2 * p - n));
             const double bump = roughness * noise(uint64_t(p.x * 1024 + p.y), uint64_t(p.z));
-            mesh.position_.push_back(direction * (50 + 3 * std::sin(direction.x * 9) + bump));
+            mesh.vertices.position.push_back(direction *
+                                             (50 + 3 * std::sin(direction.x * 9) + bump));
         }
         return it->second;
     };
@@ -124,17 +75,17 @@ inline MemorySource ball(int n, double roughness) {
                     };
                     const uint64_t a = corner(0, 0), b = corner(1, 0), c = corner(1, 1),
                                    d = corner(0, 1);
-                    mesh.triangle_.push_back({a, b, c});
-                    mesh.triangle_.push_back({a, c, d});
+                    mesh.triangles.push_back({a, b, c});
+                    mesh.triangles.push_back({a, c, d});
                 }
     return mesh;
 }
 
 inline void append(MemorySource& mesh, const MemorySource& other, const Vec3d& shift) {
-    const uint64_t base = mesh.position_.size();
-    for (const Vec3d& p : other.position_) mesh.position_.push_back(p + shift);
-    for (const auto& [a, b, c] : other.triangle_)
-        mesh.triangle_.push_back({base + a, base + b, base + c});
+    const uint64_t base = mesh.vertices.position.size();
+    for (const Vec3d& p : other.vertices.position) mesh.vertices.position.push_back(p + shift);
+    for (const auto& [a, b, c] : other.triangles)
+        mesh.triangles.push_back({base + a, base + b, base + c});
 }
 
 inline MemorySource tetrahedron(double size) {
@@ -161,22 +112,22 @@ inline MemorySource nonManifold() {
     const int n = 40;
     for (const int pages : {3, 5}) {
         MemorySource book;
-        for (int y = 0; y <= n; ++y) book.position_.push_back({0, double(y), 0});
+        for (int y = 0; y <= n; ++y) book.vertices.position.push_back({0, double(y), 0});
         for (int page = 0; page < pages; ++page) {
             const double angle = 2 * std::numbers::pi * page / pages;
-            const uint64_t base = book.position_.size();
+            const uint64_t base = book.vertices.position.size();
             const auto at = [&](int x, int y) {
                 return x == 0 ? uint64_t(y) : base + uint64_t(y * n + x - 1);
             };
             for (int y = 0; y <= n; ++y)
                 for (int x = 1; x <= n; ++x)
-                    book.position_.push_back(
+                    book.vertices.position.push_back(
                         {x * std::cos(angle), double(y),
                          x * std::sin(angle) + 0.1 * noise(uint64_t(x), uint64_t(y))});
             for (int y = 0; y < n; ++y)
                 for (int x = 0; x < n; ++x) {
-                    book.triangle_.push_back({at(x, y), at(x + 1, y), at(x + 1, y + 1)});
-                    book.triangle_.push_back({at(x, y), at(x + 1, y + 1), at(x, y + 1)});
+                    book.triangles.push_back({at(x, y), at(x + 1, y), at(x + 1, y + 1)});
+                    book.triangles.push_back({at(x, y), at(x + 1, y + 1), at(x, y + 1)});
                 }
         }
         append(mesh, book, {100.0 * pages, 0, 0});
@@ -188,7 +139,7 @@ inline MemorySource nonManifold() {
             const double turn = 2 * std::numbers::pi * i / length;
             const double across = double(j) - width / 2.0;
             const double radius = 20 + across * std::cos(turn / 2);
-            strip.position_.push_back(
+            strip.vertices.position.push_back(
                 {radius * std::cos(turn), radius * std::sin(turn), across * std::sin(turn / 2)});
         }
     const auto at = [&](int i, int j) {
@@ -196,8 +147,8 @@ inline MemorySource nonManifold() {
     };
     for (int i = 0; i < length; ++i)
         for (int j = 0; j < width; ++j) {
-            strip.triangle_.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
-            strip.triangle_.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+            strip.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+            strip.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
         }
     append(mesh, strip, {0, 0, 100});
     return mesh;
@@ -208,12 +159,12 @@ inline MemorySource nonManifold() {
 inline MemorySource dirty() {
     MemorySource mesh;
     append(mesh, sheet(50, 0.3, [](int, int) { return false; }), {4.5e6, 5.2e6, 300});
-    const size_t clean = mesh.triangle_.size();
+    const size_t clean = mesh.triangles.size();
     for (size_t t = 0; t < clean; t += 97) {
-        const auto [a, b, c] = mesh.triangle_[t];
-        mesh.triangle_.push_back({a, b, c});
-        if (t % 2 == 0) mesh.triangle_.push_back({c, b, a});
-        mesh.triangle_.push_back({a, b, b});
+        const auto [a, b, c] = mesh.triangles[t];
+        mesh.triangles.push_back({a, b, c});
+        if (t % 2 == 0) mesh.triangles.push_back({c, b, a});
+        mesh.triangles.push_back({a, b, b});
     }
     return mesh;
 }

@@ -5,9 +5,9 @@
 #include <mutex>
 #include <vector>
 
-#include "audit/spill_table.h"
 #include "base/hash.h"
 #include "base/parallel.h"
+#include "extmem/spill_table.h"
 #include "geometry/lattice.h"
 
 namespace pietra {

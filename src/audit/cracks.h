@@ -12,7 +12,7 @@
 // false), and a second counter must be told those vertices: countCracks() does so.
 //
 // Memory: the bytes given, whatever the size of the cut; more goes to temporary files
-// (spill_table.h). The result does not depend on the order of the patches.
+// (extmem/spill_table.h). The result does not depend on the order of the patches.
 
 #include <array>
 #include <cstdint>

@@ -4,9 +4,9 @@
 #include <mutex>
 #include <tuple>
 
-#include "audit/spill_table.h"
 #include "base/hash.h"
 #include "base/parallel.h"
+#include "extmem/spill_table.h"
 
 namespace pietra {
 
@@ -118,7 +118,7 @@ InputSurvey surveyInput(InputTriangles& input, const Lattice& lattice, Budget& b
         some.clear();
         for (const InputTriangles::Corners& t : batch) {
             PointKeys p;
-            for (int k = 0; k < 3; ++k) p[k] = latticeKey(snapToLattice(lattice, t[k]));
+            for (int k = 0; k < 3; ++k) p[k] = latticeKey(lattice.snap(t[k]));
             if (isDegenerate(p))
                 ++survey.degenerate;
             else

@@ -48,16 +48,16 @@ TEST(InputSurvey, doublesAndDegenerateTrianglesAreCountedOnce) {
     const SurfaceFingerprint finest = fingerprintOfCut(stream, finestCut(model.nodes).nodes);
     MemorySource source = sourceOf(model, {}, 0);
     const std::vector<EdgeKey> border = survey(source, {}).border;
-    std::swap(source.triangle_[5][1], source.triangle_[5][2]);  // faces the other way
+    std::swap(source.triangles[5][1], source.triangles[5][2]);  // faces the other way
     EXPECT_FALSE(isSameSurface(finest, survey(source, {})));
-    std::swap(source.triangle_[5][1], source.triangle_[5][2]);
-    const size_t doubles = source.triangle_.size() / 3;
-    for (size_t t = 0; t < doubles; ++t) source.triangle_.push_back(source.triangle_[3 * t]);
-    auto [a, b, c] = source.triangle_[7];
-    source.triangle_.push_back({c, b, a});
-    source.triangle_.push_back({a, b, b});
-    source.position_.push_back(source.position_[a] + 0.3);
-    source.triangle_.push_back({a, b, source.position_.size() - 1});
+    std::swap(source.triangles[5][1], source.triangles[5][2]);
+    const size_t doubles = source.triangles.size() / 3;
+    for (size_t t = 0; t < doubles; ++t) source.triangles.push_back(source.triangles[3 * t]);
+    auto [a, b, c] = source.triangles[7];
+    source.triangles.push_back({c, b, a});
+    source.triangles.push_back({a, b, b});
+    source.vertices.position.push_back(source.vertices.position[a] + 0.3);
+    source.triangles.push_back({a, b, source.vertices.position.size() - 1});
     for (const size_t memory : {size_t(1) << 20, size_t(64) << 20}) {
         const InputSurvey input = survey(source, {}, memory);
         EXPECT_EQ(input.duplicate, doubles + 1);
@@ -70,12 +70,12 @@ TEST(InputSurvey, doublesAndDegenerateTrianglesAreCountedOnce) {
 TEST(InputSurvey, bordersAreTheEdgesUsedOnce) {
     const ToyTerrain model = terrain(11);
     MemorySource source = sourceOf(model, {}, 0);
-    source.triangle_.erase(source.triangle_.begin() + 100, source.triangle_.begin() + 103);
+    source.triangles.erase(source.triangles.begin() + 100, source.triangles.begin() + 103);
     std::map<EdgeKey, int> uses;
-    for (const auto& t : source.triangle_)
+    for (const auto& t : source.triangles)
         for (int k = 0; k < 3; ++k) {
-            const uint64_t p = latticeKey(Vec3i(source.position_[t[k]]));
-            const uint64_t q = latticeKey(Vec3i(source.position_[t[(k + 1) % 3]]));
+            const uint64_t p = latticeKey(Vec3i(source.vertices.position[t[k]]));
+            const uint64_t q = latticeKey(Vec3i(source.vertices.position[t[(k + 1) % 3]]));
             ++uses[{std::min(p, q), std::max(p, q)}];
         }
     std::vector<EdgeKey> border;
@@ -89,13 +89,13 @@ TEST(InputSurvey, moreBorderThanMemoryIsRefused) {
     const ToyTerrain model = terrain();
     MemorySource source = sourceOf(model, {}, 0);
     // A soup: no vertex is shared.
-    for (size_t t = 0; t < source.triangle_.size(); ++t)
-        for (uint64_t& corner : source.triangle_[t]) {
-            source.position_.push_back(source.position_[corner] +
-                                       Vec3d(0, 0, 1000 + 100 * double(t)));
-            corner = source.position_.size() - 1;
+    for (size_t t = 0; t < source.triangles.size(); ++t)
+        for (uint64_t& corner : source.triangles[t]) {
+            source.vertices.position.push_back(source.vertices.position[corner] +
+                                               Vec3d(0, 0, 1000 + 100 * double(t)));
+            corner = source.vertices.position.size() - 1;
         }
-    Budget budget((1 << 20) + source.position_.size() * sizeof(Vec3d) + 50000);
+    Budget budget((1 << 20) + source.vertices.position.size() * sizeof(Vec3d) + 50000);
     InputTriangles input(source, budget, 1 << 20, tempDir());
     try {
         surveyInput(input, {}, budget, 1 << 20, tempDir());

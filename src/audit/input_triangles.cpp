@@ -10,10 +10,6 @@ namespace {
 constexpr uint64_t kEmptySlot = std::numeric_limits<uint64_t>::max();
 }
 
-Vec3i snapToLattice(const Lattice& lattice, const Vec3d& p) {
-    return snapToShift(Vec3i(glm::floor(lattice.toLattice(p) + 0.5)), lattice.shift);
-}
-
 InputTriangles::InputTriangles(TriangleSource& source, Budget& budget, size_t memory_bytes,
                                const std::string& temp_dir, Progress* progress)
     : source_(source), progress_(progress), vertex_count_(source.vertexCount()) {

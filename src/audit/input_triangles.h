@@ -22,9 +22,6 @@
 
 namespace pietra {
 
-/// The point of the model's lattice that stands for an input position.
-Vec3i snapToLattice(const Lattice& lattice, const Vec3d& p);
-
 class InputTriangles {
 public:
     /// Corners in the input's own coordinates.

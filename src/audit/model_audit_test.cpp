@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "audit/audit_testing.h"
@@ -66,7 +67,18 @@ TEST(ModelAudit, namesWhatIsWrong) {
     EXPECT_EQ(faultOf(false, [&](Case& c) { c.model.nodes[7].cone.cos_angle = 1; }),
               "node 7: a normal lies outside its cone");
     EXPECT_EQ(faultOf(false, [&](Case& c) { c.model.nodes[0].closed = true; }),
-              "node 0: it says closed, but has a border");
+              "node 0: it says closed, but has a border, a fold, or a triangle turned over");
+    EXPECT_EQ(faultOf(false,
+                      [&](Case& c) {
+                          // Without its rim it could be part of something closed...
+                          Mesh& mesh = c.model.patches[0];
+                          std::fill(mesh.edge_class.begin(), mesh.edge_class.end(), uint8_t(0));
+                          c.model.nodes[0].closed = true;
+                          // ...were it not for this triangle.
+                          std::swap(mesh.triangle[1][0], mesh.triangle[1][1]);
+                          c.model.nodes[0].cone.cos_angle = -1;
+                      }),
+              "node 0: it says closed, but has a border, a fold, or a triangle turned over");
     const std::string torn = faultOf(false, [&](Case& c) { c.model.nodes[8].error *= 1.01f; });
     EXPECT_NE(torn.find("differs from node 8 of its group"), std::string::npos) << torn;
     // A hole of one triangle, in all cuts that draw that leaf; counts made to fit.
@@ -83,9 +95,9 @@ TEST(ModelAudit, namesWhatIsWrong) {
     });
     EXPECT_NE(untrue.find(" samples violate the stated error, the first at"), std::string::npos)
         << untrue;
-    EXPECT_EQ(faultOf(true, [&](Case& c) { c.source.triangle_.pop_back(); }),
+    EXPECT_EQ(faultOf(true, [&](Case& c) { c.source.triangles.pop_back(); }),
               "the finest cut is not the input");
-    EXPECT_EQ(faultOf(true, [&](Case& c) { c.source.position_[5].x += 0.03; }),
+    EXPECT_EQ(faultOf(true, [&](Case& c) { c.source.vertices.position[5].x += 0.03; }),
               "the finest cut is not the input");
 }
 

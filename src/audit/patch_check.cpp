@@ -52,11 +52,17 @@ bool isWithin(const Mesh& mesh, const NormalCone& cone) {
     return true;
 }
 
-bool hasBorder(const Mesh& mesh) {
-    for (size_t t = 0; t < mesh.triangleCount(); ++t)
-        for (int k = 0; k < 3; ++k)
-            if (mesh.edgeClass(t, k) == EdgeClass::kBorder) return true;
-    return false;
+/// Every edge is an ordinary one, and no two triangles run along it in the same direction.
+bool mayBeClosed(const Mesh& mesh) {
+    std::vector<uint64_t> directed;
+    directed.reserve(3 * mesh.triangleCount());
+    for (size_t t = 0; t < mesh.triangleCount(); ++t) {
+        if (mesh.edge_class[t] != 0) return false;
+        const Triangle& f = mesh.triangle[t];
+        for (size_t k = 0; k < 3; ++k) directed.push_back(uint64_t(f[k]) << 32 | f[(k + 1) % 3]);
+    }
+    std::sort(directed.begin(), directed.end());
+    return std::adjacent_find(directed.begin(), directed.end()) == directed.end();
 }
 
 /// Gathers what the threads find.
@@ -99,8 +105,9 @@ void checkPatch(NodeIndex i, const Node& node, const Mesh& mesh, const Lattice& 
         findings.fault(i, &PatchReport::outside_bounds, "a vertex lies outside its bounds");
     if (!isWithin(mesh, node.cone))
         findings.fault(i, &PatchReport::outside_cone, "a normal lies outside its cone");
-    if (node.closed && hasBorder(mesh))
-        findings.fault(i, &PatchReport::falsely_closed, "it says closed, but has a border");
+    if (node.closed && !mayBeClosed(mesh))
+        findings.fault(i, &PatchReport::falsely_closed,
+                       "it says closed, but has a border, a fold, or a triangle turned over");
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ struct PatchReport {
     uint64_t outside_lattice = 0;  ///< a vertex that is not on the model's lattice
     uint64_t outside_bounds = 0;   ///< a vertex outside the node's bounds
     uint64_t outside_cone = 0;     ///< a triangle's normal outside the node's cone
-    uint64_t falsely_closed = 0;   ///< the node says closed, but the patch has a border
+    uint64_t falsely_closed = 0;   ///< the node says closed, but the patch has an edge that is not
     std::string first_fault;       ///< of the least node, one sentence; empty if there is none
     bool ok() const { return first_fault.empty(); }
 };

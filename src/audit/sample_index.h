@@ -17,7 +17,7 @@
 #include <span>
 #include <vector>
 
-#include "audit/triangle_distance.h"
+#include "geometry/triangle_distance.h"
 #include "base/budget.h"
 
 namespace pietra {

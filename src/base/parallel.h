@@ -48,8 +48,8 @@ void parallelForSlices(size_t count, size_t grain, Body&& body) {
 template <class Produce, class Consume>
 void orderedPipeline(size_t count, size_t in_flight, Produce&& produce, Consume&& consume) {
     using Result = decltype(produce(size_t(0)));
-    // Results wait in slots of ours: where a body throws, the pipeline forgets what is under way. As
-    // they are consumed in order, those under way are consecutive: no two have one slot.
+    // Results wait in slots of ours: where a body throws, the pipeline forgets what is under way.
+    // As they are consumed in order, those under way are consecutive: no two have one slot.
     std::vector<std::optional<Result>> slots(in_flight);
     size_t next = 0;
     tbb::parallel_pipeline(

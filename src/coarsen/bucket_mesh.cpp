@@ -249,6 +249,7 @@ private:
             forEach([&](uint32_t v, const HalfEdge& h) { half[next[v]++] = h; });
         }
         mesh().edge_class.assign(mesh().triangle.size(), 0);
+        LocalComponents components(mesh().triangle.size());
         for (size_t v = 0; v < keys_.size(); ++v) {
             const auto begin = half.begin() + start[v], end = half.begin() + start[v + 1];
             std::sort(begin, end, [](const HalfEdge& a, const HalfEdge& b) {
@@ -257,16 +258,36 @@ private:
             for (auto first = begin; first != end;) {
                 auto last = first;
                 while (last != end && last->other == first->other) ++last;
-                classifyEdge(uint32_t(v), std::span(first, last));
+                const std::span<const HalfEdge> uses(first, last);
+                const bool owned = inside_[keys_[v] < keys_[uses[0].other] ? v : uses[0].other];
+                linkUses(uint32_t(v), uses, owned, components);
+                if (owned) classifyEdge(uint32_t(v), uses);
                 first = last;
             }
         }
+        out_.bucket.components = components.finish();
     }
 
+    // Own triangles hang together over the edge. Where others may use it too, the uses are told:
+    // all that matter, as three are as good as any more.
+    void linkUses(uint32_t v, std::span<const HalfEdge> uses, bool owned,
+                  LocalComponents& components) {
+        size_t own = uses.size();  // they come first
+        while (own > 0 && uses[own - 1].triangle >= mesh().triangle.size()) --own;
+        for (size_t i = 1; i < own; ++i) components.unite(uses[0].triangle, uses[i].triangle);
+        if (own == uses.size() && owned) {
+            if (own != 2 || uses[0].forward == uses[1].forward)
+                components.markOpen(uses[0].triangle);
+            return;
+        }
+        const auto [low, high] = std::minmax(keys_[v], keys_[uses[0].other]);
+        for (size_t i = 0; i < std::min(own, size_t(3)); ++i)
+            components.share(uses[i].triangle, low, high, uses[i].forward == (keys_[v] == low));
+    }
+
+    // Of an edge that this bucket owns.
     void classifyEdge(uint32_t v, std::span<const HalfEdge> uses) {
         const uint32_t w = uses[0].other;
-        const uint32_t owner = keys_[v] < keys_[w] ? v : w;
-        if (!inside_[owner]) return;
         constexpr EdgeClass kByUses[] = {EdgeClass::kMany, EdgeClass::kBorder, EdgeClass::kManifold,
                                          EdgeClass::kTriple};
         const EdgeClass edge_class = uses.size() < 4 ? kByUses[uses.size()] : EdgeClass::kMany;

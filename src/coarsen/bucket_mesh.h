@@ -5,7 +5,8 @@
 // A bucket sees all triangles around the vertices in its own cell (partition.h), so it knows the
 // truth about those vertices, and about the edges whose smaller end point lies there. What
 // other buckets must learn of that (a normal, an edge that is no ordinary one) goes to them as
-// messages. weldBucket() makes mesh and messages; applyMessages() completes a mesh. Pure functions:
+// messages, and to which components its triangles belong goes to a table (components.h).
+// weldBucket() makes mesh and messages; applyMessages() completes a mesh. Pure functions:
 // buckets in parallel, in any order, all of the first before any of the second.
 
 #include <cstddef>
@@ -13,6 +14,7 @@
 #include <span>
 #include <vector>
 
+#include "coarsen/components.h"
 #include "coarsen/partition.h"
 #include "geometry/mesh.h"
 
@@ -21,6 +23,7 @@ namespace pietra {
 struct BucketMesh {
     Mesh mesh;                       ///< triangles in path order; scalar as in the schema
     std::vector<uint8_t> is_inside;  ///< per vertex: it lies in the bucket's cell
+    BucketComponents components;     ///< of the triangles
 };
 
 /// What the bucket that owns a vertex or an edge tells another that uses it.

@@ -16,7 +16,7 @@ struct BlobHeader {
     uint8_t has_classes;  // else all are zero
     uint8_t has_bounds;   // else all are `bound`
     uint8_t has_colours;
-    uint8_t pad = 0;
+    uint8_t closed;
     float bound;
 };
 
@@ -79,6 +79,7 @@ CellBlob CellStore::put(const CellMesh& cell) {
     header.has_bounds =
         !allEqual(bounds.to_original, first) || !allEqual(bounds.from_original, first);
     header.has_colours = !mesh.colour.empty();
+    header.closed = cell.closed;
     header.bound = first;
 
     std::vector<std::byte>& out = scratch<std::byte>();
@@ -115,6 +116,7 @@ void CellStore::get(const CellBlob& blob, CellMesh& cell) const {
     Unpacker unpack(bytes);
     BlobHeader header;
     unpack.get(&header, 1);
+    cell.closed = header.closed != 0;
     Mesh& mesh = cell.mesh;
     std::vector<uint64_t>& keys = scratch<uint64_t>();
     unpack.get(keys, header.vertices);

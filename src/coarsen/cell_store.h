@@ -16,6 +16,7 @@ namespace pietra {
 struct CellMesh {
     Mesh mesh;
     FaceBounds bounds;
+    bool closed = false;  ///< all belong to closed, consistently oriented components
 };
 
 class CellStore;

@@ -55,6 +55,7 @@ void DiamondWorker::addCell(const CellMesh& child, uint8_t label) {
     append(merged_.bounds.to_original, child.bounds.to_original);
     append(merged_.bounds.from_original, child.bounds.from_original);
     label_.resize(merged.triangleCount(), label);
+    closed_[label] &= child.closed;
 }
 
 void DiamondWorker::merge(const DiamondInput& input) {
@@ -62,6 +63,7 @@ void DiamondWorker::merge(const DiamondInput& input) {
     merged_.bounds.to_original.clear();
     merged_.bounds.from_original.clear();
     label_.clear();
+    closed_.assign(input.children.size(), 1);
     size_t triangles = 0;
     for (const std::vector<CellBlob>& blobs : input.children)
         for (const CellBlob& blob : blobs) triangles += blob.triangles;
@@ -79,6 +81,7 @@ void DiamondWorker::run(const DiamondInput& input, DiamondOutput& output) {
     if (merged_.mesh.triangle.empty()) {  // its children kept nothing of what they had to show
         output = DiamondOutput{};
         output.cells.resize(input.children.size());
+        for (size_t c = 0; c < output.cells.size(); ++c) output.cells[c].closed = closed_[c];
         output.error = input.child_error;
         return;
     }
@@ -115,6 +118,8 @@ void DiamondWorker::takeApart(size_t cells, DiamondOutput& output) {
         cell.mesh.clear();
         cell.bounds.to_original.clear();
         cell.bounds.from_original.clear();
+        // Triangles keep their cell, and collapses keep components apart. Clustering does not.
+        cell.closed = closed_[c] && simplified_.clustered == 0;
         local_.assign(mesh.vertexCount(), kNoVertex);
         for (size_t t = 0; t < mesh.triangleCount(); ++t) {
             if (simplified_.cell[t] != c) continue;

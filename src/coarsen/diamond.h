@@ -45,15 +45,16 @@ private:
     Deviation deviation_;
     KeyMap ids_;
     CellMesh child_, merged_;
-    std::vector<uint8_t> label_;  // per merged triangle: its cell
+    std::vector<uint8_t> label_;   // per merged triangle: its cell
+    std::vector<uint8_t> closed_;  // per cell: what is merged into it is closed
     SimplifyOutput simplified_;
     FaceBounds bounds_;
     std::vector<uint32_t> local_;  // per simplified vertex: its number in the cell at hand
 };
 
 /// Triangles that a cell with `children_triangles` below it is to keep: half of them, or 63 % once
-/// that comes below `patch_triangles` / 2, a size at which a surface's cells then stay from level to
-/// level. The coarsest levels are few and go lower; a root keeps at most `patch_triangles` / 4.
+/// that comes below `patch_triangles` / 2, a size at which a surface's cells then stay from level
+/// to level. The coarsest levels are few and go lower; a root keeps at most `patch_triangles` / 4.
 uint32_t cellQuota(uint64_t children_triangles, uint32_t patch_triangles, int level);
 
 }  // namespace pietra

@@ -16,6 +16,7 @@ struct WeldedBlob {
     uint64_t position = 0;
     size_t triangles = 0;
     size_t vertices = 0;
+    size_t component_runs = 0;
     std::vector<std::pair<uint64_t, uint32_t>> messages;  // runs in the message spill
 };
 
@@ -39,9 +40,11 @@ public:
         pack(mesh.triangle);
         pack(mesh.edge_class);
         pack(welded.bucket.is_inside);
+        pack(welded.bucket.components.runs);
         blobs_[bucket].position = meshes_.append(out);
         blobs_[bucket].triangles = mesh.triangle.size();
         blobs_[bucket].vertices = mesh.position.size();
+        blobs_[bucket].component_runs = welded.bucket.components.runs.size();
         putMessages(welded.messages);
     }
 
@@ -63,6 +66,7 @@ public:
         unpack(out.mesh.triangle, t);
         unpack(out.mesh.edge_class, t);
         unpack(out.is_inside, v);
+        unpack(out.components.runs, blob.component_runs);
         std::vector<Message> messages;
         for (const auto& [position, count] : blob.messages) {
             const size_t had = messages.size();
@@ -101,7 +105,8 @@ private:
 /// ones.
 class LeafCutter {
 public:
-    LeafCutter(const VertexRecord& record, float bound) : record_(record), bound_(bound) {}
+    LeafCutter(const VertexRecord& record, const ComponentTable& components, float bound)
+        : record_(record), components_(components), bound_(bound) {}
 
     /// Appends the triangles of `bucket` that lie in the cell.
     void add(const BucketMesh& bucket, CellId cell) {
@@ -114,6 +119,7 @@ public:
             out_.mesh.triangle.push_back(triangle);
             out_.mesh.edge_class.push_back(mesh.edge_class[t]);
         }
+        if (begin < end) out_.closed = out_.closed && allClosed(bucket.components.runs, begin, end);
     }
 
     /// The leaf so far; starts the next.
@@ -125,10 +131,19 @@ public:
     }
     void start() {
         out_.mesh.clear();
+        out_.closed = true;
         ids_.reserve(0);
     }
 
 private:
+    bool allClosed(const std::vector<ComponentRun>& runs, size_t begin, size_t end) const {
+        auto run = std::upper_bound(runs.begin(), runs.end(), begin,
+                                    [](size_t t, const ComponentRun& r) { return t < r.first; });
+        for (--run; run != runs.end() && run->first < end; ++run)
+            if (!components_.isClosed(run->component)) return false;
+        return true;
+    }
+
     static size_t findPath(const Mesh& mesh, CellPath path) {
         size_t low = 0, high = mesh.triangle.size();
         if (path == 0) return 0;
@@ -156,6 +171,7 @@ private:
     }
 
     const VertexRecord& record_;
+    const ComponentTable& components_;
     float bound_;
     KeyMap ids_;
     CellMesh out_;
@@ -167,6 +183,7 @@ Leaves buildLeaves(Partition& partition, const VertexRecord& record, const LeafS
                    TempSpace& space, CellStore& store, Progress& progress) {
     const std::vector<Bucket>& buckets = partition.buckets();
     BucketRepository repository(space, record, buckets.size());
+    ComponentTable components(space, settings.component_bytes);
     Leaves leaves;
     std::mutex mutex;
     std::vector<LeafCell> cells;
@@ -181,10 +198,12 @@ Leaves buildLeaves(Partition& partition, const VertexRecord& record, const LeafS
             leaves.triangles += welded.bucket.mesh.triangleCount();
             leaves.edges += welded.edges;
         }
+        components.add(welded.bucket.components);
         repository.put(b, std::move(welded));
         progress.tick(buckets[b].own_count);
     });
     partition.clear();
+    components.resolve();
     leaves.tree = std::make_unique<CellTree>(cells, settings.leaf_triangles);
 
     progress.beginStage("cut leaves", leaves.triangles);
@@ -203,7 +222,7 @@ Leaves buildLeaves(Partition& partition, const VertexRecord& record, const LeafS
         else
             runs.back().second = i + 1;
     parallelFor(runs.size(), [&](size_t r) {
-        LeafCutter cutter(record, settings.bound);
+        LeafCutter cutter(record, components, settings.bound);
         size_t loaded = bucketAt(firstPath(order[runs[r].first]));
         BucketMesh bucket = repository.get(loaded);
         for (size_t i = runs[r].first; i < runs[r].second; ++i) {

@@ -1,7 +1,8 @@
 #pragma once
 // From buckets to leaf cells: welds every bucket, lets buckets tell each other what they know,
-// builds and closes the tree of cells, and stores each leaf's mesh. Two passes over the buckets, in
-// parallel; memory O(a bucket) a thread, plus the tree.
+// builds and closes the tree of cells, finds the closed components, and stores each leaf's mesh.
+// Two passes over the buckets, in parallel; memory O(a bucket) a thread, plus the tree, plus the
+// table of the components that buckets share.
 
 #include <memory>
 #include <unordered_map>
@@ -16,6 +17,7 @@ namespace pietra {
 struct LeafSettings {
     uint32_t leaf_triangles = 4000;
     float bound = 0;  ///< quantisation error: the bounds of every leaf face, lattice units
+    size_t component_bytes = 1 << 20;  ///< memory for joining components, at least this
 };
 
 struct Leaves {
@@ -24,8 +26,6 @@ struct Leaves {
     uint64_t triangles = 0;
     uint64_t duplicates = 0;
     EdgeCounts edges;
-    /// Every edge of the input is used by exactly two triangles of opposite winding.
-    bool isClosed() const { return edges.border + edges.non_manifold + edges.inconsistent == 0; }
 };
 
 /// Consumes the partition's records. `store` receives the leaves' meshes.

@@ -86,5 +86,11 @@ TEST(Lattice, keysAreUniqueAndSnappingStaysInside) {
     }
 }
 
+TEST(Lattice, snapsToTheNearestPoint) {
+    const Lattice lattice{{100, -100, 0.5}, 0.25, 2};
+    EXPECT_EQ(lattice.snap({100, -100, 0.5}), Vec3i(0, 0, 0));
+    EXPECT_EQ(lattice.snap({100.49, -99.4, 2.6}), Vec3i(4, 4, 8));
+}
+
 }  // namespace
 }  // namespace pietra

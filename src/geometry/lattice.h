@@ -7,6 +7,7 @@
 // its vertices are multiples of 2^shift, and `step` stays that of the fine lattice.
 
 #include <cstdint>
+#include <glm/common.hpp>
 
 #include "geometry/vec.h"
 
@@ -26,6 +27,9 @@ struct Lattice {
     Vec3d toInput(const Vec3d& p) const { return origin + step * p; }
     /// Real-valued lattice coordinates, not rounded.
     Vec3d toLattice(const Vec3d& p) const { return (p - origin) / step; }
+    /// The point that stands for an input position: the nearest multiple of 2^shift, halves upward.
+    /// Not clamped to the cube.
+    Vec3i snap(const Vec3d& p) const;
     /// The spacing of vertices, in input units.
     double vertexStep() const { return step * double(1 << shift); }
 };
@@ -55,6 +59,10 @@ inline int32_t snapToShift(int32_t x, int shift) {
 
 inline Vec3i snapToShift(const Vec3i& p, int shift) {
     return {snapToShift(p.x, shift), snapToShift(p.y, shift), snapToShift(p.z, shift)};
+}
+
+inline Vec3i Lattice::snap(const Vec3d& p) const {
+    return snapToShift(Vec3i(glm::floor(toLattice(p) + 0.5)), shift);
 }
 
 }  // namespace pietra

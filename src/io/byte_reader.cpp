@@ -24,6 +24,7 @@ void ByteReader::release() {
     base_ += cursor_;
     cursor_ = end_ = 0;
     std::vector<uint8_t>().swap(buffer_);
+    source_->release();
 }
 
 void ByteReader::fill() {

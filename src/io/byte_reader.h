@@ -39,7 +39,8 @@ public:
     /// Moves the cursor over bytes that peek() has shown.
     void advance(size_t bytes) { cursor_ += bytes; }
     bool atEnd() { return peek(1) == 0; }
-    /// Gives the window's memory back until the next read; the cursor stays.
+    /// Gives the window's memory and what the source holds back until the next read; the cursor
+    /// stays.
     void release();
 
     /// "byte 17", or "byte 17 of the unpacked data", for messages.

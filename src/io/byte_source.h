@@ -1,9 +1,10 @@
 #pragma once
-// The bytes of an input file, whether it is stored plain or gzipped. Readers of formats sit on top
-// and never know which.
+// The bytes of an input file, whether it is stored plain or packed (gzip, xz, zstd; see
+// packed_source.h). Readers of formats sit on top and never know which.
 //
-// Reads are by offset into the plain bytes. A gzipped file can only be decompressed forwards: a
-// read before the position reached starts again from the beginning. Memory: a few hundred KiB.
+// Reads are by offset into the plain bytes. A packed file can only be decompressed forwards: a read
+// before the position reached starts again from the beginning. Memory: a few hundred KiB, and what
+// unpacking takes.
 // Files are read, never mapped, since mapped pages count in the resident set. Not thread-safe.
 
 #include <cstddef>
@@ -28,10 +29,15 @@ public:
     /// Bytes on disk.
     virtual uint64_t storedBytes() const = 0;
     virtual bool isCompressed() const = 0;
+    /// Gives file descriptor and memory back until the next read, so that a model may have more
+    /// files than a process may hold open.
+    virtual void release() {}
+    /// The same bytes once more, to be read at another place at the same time.
+    virtual std::unique_ptr<ByteSource> again() const = 0;
 };
 
-/// Opens a regular file; gzip is recognised by its magic bytes. Throws IoError (cannot open),
-/// InputError (a pipe or device: a mesh is read several times).
+/// Opens a regular file; packed ones are recognised by their magic bytes. Throws IoError (cannot
+/// open), InputError (a pipe or device: a mesh is read several times).
 std::unique_ptr<ByteSource> openBytes(const std::string& path);
 
 /// Bytes that are already there, for tests and fuzzing; `name` stands for the path.

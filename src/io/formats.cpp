@@ -1,5 +1,6 @@
 #include "io/formats.h"
 
+#include "io/obj_source.h"
 #include "io/ply_source.h"
 
 namespace pietra {
@@ -8,6 +9,7 @@ namespace {
 
 constexpr MeshFormat kFormats[] = {
     {"PLY", isPly, openPly},
+    {"OBJ", isObj, openObj},
 };
 
 }  // namespace

@@ -2,7 +2,10 @@
 // Numbers in text, fast. Reals are correctly rounded, as std::from_chars does it, which takes the
 // rare hard ones; unlike it, a leading '+' is allowed. No locale.
 
+#include <array>
+#include <bit>
 #include <charconv>
+#include <cstddef>
 #include <cstdint>
 
 namespace pietra {
@@ -17,6 +20,31 @@ inline constexpr double kExactPower[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6
                                          1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
                                          1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 inline constexpr int kLargestExactPower = 22;
+
+/// Powers of five that 64 bits hold.
+inline constexpr int kLargestPowerOfFive = 27;
+inline constexpr auto kPowerOfFive = [] {
+    std::array<uint64_t, kLargestPowerOfFive + 1> powers{1};
+    for (size_t i = 1; i < powers.size(); ++i) powers[i] = 5 * powers[i - 1];
+    return powers;
+}();
+
+/// mantissa / 10^power, correctly rounded; mantissa > 0, power in [0, kLargestPowerOfFive].
+inline double divideByPowerOfTen(uint64_t mantissa, int power) {
+    using Wide = unsigned __int128;
+    const uint64_t divisor = kPowerOfFive[size_t(power)];
+    const int up = std::countl_zero(mantissa), divisor_up = std::countl_zero(divisor);
+    // With both top bits set and the numerator halved, the quotient has 63 or 64 bits: more than
+    // ten below the last one of the result, of which the lowest tells whether anything is left.
+    const Wide numerator = Wide(mantissa << up) << 63;
+    const uint64_t normalised = divisor << divisor_up;
+    const auto quotient = uint64_t(numerator / normalised);
+    const bool rest = Wide(quotient) * normalised != numerator;
+    const int exponent = divisor_up - up - 63 - power;
+    // The conversion rounds once; the power of two is exact, as the result is far from the ends.
+    return double(quotient | uint64_t(rest)) *
+           std::bit_cast<double>(uint64_t(1023 + exponent) << 52);
+}
 
 /// The power of ten of the first digit that is not zero, in an unsigned number.
 inline int64_t decimalExponent(const char* p, const char* end) {
@@ -62,13 +90,14 @@ inline const char* parseInteger(const char* p, int64_t& value) {
     return p;
 }
 
-/// Parses a real number at `p` ("-1.5e-3", "nan", "inf" too); returns the character after it, or
+/// Parses a real number at `text` ("-1.5e-3", "nan", "inf" too); returns the character after it, or
 /// null if there is none. `end` is where the text ends; the byte there must be no digit. Too large
 /// or too small a number becomes infinite or zero.
-inline const char* parseReal(const char* p, const char* end, double& value) {
-    const char* const start = *p == '+' ? p + 1 : p;
-    p = start;
+inline const char* parseReal(const char* text, const char* end, double& value) {
+    const char* const start = *text == '+' ? text + 1 : text;
+    const char* p = start;
     const bool negative = *p == '-';
+    if (negative && start != text) return nullptr;
     if (negative) ++p;
     const char* const digits = p;
     uint64_t mantissa = 0;
@@ -100,6 +129,11 @@ inline const char* parseReal(const char* p, const char* end, double& value) {
             const double m = double(mantissa);
             const double magnitude = exponent < 0 ? m / detail::kExactPower[-exponent]
                                                   : m * detail::kExactPower[exponent];
+            value = negative ? -magnitude : magnitude;
+            return p;
+        }
+        if (mantissa > 0 && exponent <= 0 && exponent >= -detail::kLargestPowerOfFive) {
+            const double magnitude = detail::divideByPowerOfTen(mantissa, int(-exponent));
             value = negative ? -magnitude : magnitude;
             return p;
         }

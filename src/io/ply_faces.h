@@ -12,19 +12,9 @@
 #include <vector>
 
 #include "io/ply_cursor.h"
-#include "io/triangle_source.h"
+#include "io/triangle_room.h"
 
 namespace pietra {
-
-/// Where triangles are put: room for a batch, filled from the front. (A vector would be cleared
-/// before each batch only to be overwritten, which costs as much as the decoding.)
-struct TriangleRoom {
-    std::array<uint64_t, 3>* data = nullptr;
-    size_t capacity = 0;
-    size_t size = 0;
-    size_t left() const { return capacity - size; }
-    void add(uint64_t a, uint64_t b, uint64_t c) { data[size++] = {a, b, c}; }
-};
 
 class PlyFaceReader {
 public:

@@ -422,24 +422,6 @@ TEST(PlySource, streamsCanBeReadInAnyOrderAgain) {
     }
 }
 
-TEST(PlySource, joinsFiles) {
-    const ScratchDirectory dir;
-    const Grid grid{10};
-    const std::string a = dir.write("a.ply", plainGrid(grid, PlyBuilder::kLittle));
-    const std::string b = dir.write("b.ply", attributeMesh(PlyBuilder::kBig, true, "uchar"));
-    const auto source = openSource({a, b, a});
-    const WholeMesh mesh = readWhole(*source);
-    EXPECT_EQ(mesh.vertices.position.size(), 121u + 4 + 121);
-    EXPECT_EQ(mesh.triangles.size(), 200u + 3 + 200);
-    EXPECT_EQ(mesh.triangles[200], (std::array<uint64_t, 3>{121, 122, 123}));
-    EXPECT_EQ(mesh.schema, AttributeSchema{});
-    EXPECT_TRUE(mesh.vertices.normal.empty() && mesh.vertices.scalar.empty());
-    EXPECT_EQ(mesh.notes[0], "attributes that not all files have are left out");
-    const WholeMesh twice = readWhole(*openSource({b, b}));
-    EXPECT_EQ(twice.schema.scalars.size(), 2u);
-    EXPECT_EQ(twice.vertices.scalar.size(), 16u);
-}
-
 TEST(PlySource, joinsManyFilesInTheMemoryOfOne) {
     const ScratchDirectory dir;
     const std::string path = dir.write("a.ply", plainGrid(Grid{250}, PlyBuilder::kLittle));
@@ -475,7 +457,7 @@ TEST(PlySource, namesEveryFault) {
     };
     const Case cases[] = {
         {"", "the file is empty"},
-        {"solid", "is of no format that Pietra reads (PLY)"},
+        {"solid", "is of no format that Pietra reads (PLY, OBJ)"},
         {"ply\nformat ascii 1.0\n", "line 3: the header has no end_header"},
         {"ply \n", "line 2: the header has no end_header"},
         {"ply x\n", "is no PLY file: its first line is not \"ply\""},

@@ -3,9 +3,10 @@
 // refer to them by index, in bounded memory, whatever the file format.
 //
 // A source is opened by openSource(). Each of the two streams can be read from its start any number
-// of times, in any order, one stream at a time. Polygons come out as triangles (fans, also of concave
-// ones, which notes() counts), strips as triangles with the right orientation. Batches are as large as the
-// source likes, at most kMaxBatch elements. Not thread-safe. Faults throw InputError or IoError.
+// of times, in any order, one stream at a time. Polygons come out as triangles (fans, also of
+// concave ones, which notes() counts), strips as triangles with the right orientation. Batches are
+// as large as the source likes, at most kMaxBatch elements. Not thread-safe. Faults throw
+// InputError or IoError.
 
 #include <array>
 #include <cstdint>
@@ -19,16 +20,16 @@ namespace pietra {
 
 /// A run of consecutive vertices, structure of arrays.
 struct VertexBatch {
-    uint64_t first = 0;            ///< index of the first one
-    std::vector<Vec3d> position;   ///< input coordinates; finite (the source has checked)
-    std::vector<Vec3f> normal;     ///< as in the file, or empty
-    std::vector<Rgba8> colour;     ///< or empty
-    std::vector<float> scalar;     ///< vertex-major, schema.scalars.size() a vertex, or empty
+    uint64_t first = 0;           ///< index of the first one
+    std::vector<Vec3d> position;  ///< input coordinates; finite (the source has checked)
+    std::vector<Vec3f> normal;    ///< as in the file, or empty
+    std::vector<Rgba8> colour;    ///< or empty
+    std::vector<float> scalar;    ///< vertex-major, schema.scalars.size() a vertex, or empty
 };
 
 struct TriangleBatch {
-    uint64_t first = 0;                              ///< number of the first triangle
-    std::vector<std::array<uint64_t, 3>> triangle;   ///< indices, all below vertexCount()
+    uint64_t first = 0;                             ///< number of the first triangle
+    std::vector<std::array<uint64_t, 3>> triangle;  ///< indices, all below vertexCount()
 };
 
 inline constexpr size_t kMaxBatch = 1 << 16;

@@ -51,8 +51,8 @@ struct Culling {
     bool contribution = false;  ///< leave out what shows smaller than half the tolerance
 };
 
-/// Nothing of the node nor of anything finer below it can be seen; judged by its saturated sphere, so
-/// the same for all of its group.
+/// Nothing of the node nor of anything finer below it can be seen; judged by its saturated sphere,
+/// so the same for all of its group.
 bool branchInvisible(const Node& node, const View& view, double pixels, const Culling& culling);
 /// Nothing of the node's own patch can be seen.
 bool patchInvisible(const Node& node, const View& view, double pixels, const Culling& culling);

@@ -1,6 +1,6 @@
 #pragma once
-// The multiresolution contract, part two: what a method is to the rest of the house. A method is one
-// row of the table in methods/method_table.h; nothing above src/methods knows its name.
+// The multiresolution contract, part two: what a method is to the rest of the house. A method is
+// one row of the table in methods/method_table.h; nothing above src/methods knows its name.
 
 #include <cstdint>
 #include <span>
@@ -18,14 +18,14 @@ namespace pietra {
 /// What a build is asked for.
 struct BuildSettings {
     std::string output;
-    bool force = false;                ///< overwrite `output`
-    size_t memory_bytes = 0;           ///< bound of the process's resident set
-    int jobs = 1;                      ///< threads
-    std::string temp_dir;              ///< existing directory for temporary data
+    bool force = false;       ///< overwrite `output`
+    size_t memory_bytes = 0;  ///< bound of the process's resident set
+    int jobs = 1;             ///< threads
+    std::string temp_dir;     ///< existing directory for temporary data
     PrecisionSetting precision;
-    uint32_t leaf_triangles = 4000;    ///< most triangles of a leaf
-    uint32_t patch_triangles = 2000;   ///< coarse patches are about this large
-    std::string input_name;            ///< for messages
+    uint32_t leaf_triangles = 4000;   ///< most triangles of a leaf
+    uint32_t patch_triangles = 2000;  ///< coarse patches are about this large
+    std::string input_name;           ///< for messages
     uint32_t input_files = 1;
 };
 

@@ -2,17 +2,17 @@
 // The multiresolution contract, part one: nodes, their error, and the cut rule.
 //
 // A model is a table of nodes. A node is the unit of refinement on disk: it has one patch (a small
-// mesh) and up to two children whose patches together replace it. Nodes of one `group` (a diamond of
-// Adaptive TetraPuzzles) are refined only together: they have equal `error` and equal `saturated`
-// sphere, so every criterion that depends on these two alone treats them alike. Parents' errors are
-// at least their children's, and parents' saturated spheres enclose their children's, hence any
-// criterion that is monotone in (error, sphere) selects a valid, crack-free cut.
-// Source: Cignoni et al. 2004, sections 3 and 4. Units: lattice units (geometry/lattice.h).
+// mesh) and up to two children whose patches together replace it. Nodes of one `group` (a diamond
+// of Adaptive TetraPuzzles) are refined only together: they have equal `error` and equal
+// `saturated` sphere, so every criterion that depends on these two alone treats them alike.
+// Parents' errors are at least their children's, and parents' saturated spheres enclose their
+// children's, hence any criterion that is monotone in (error, sphere) selects a valid, crack-free
+// cut. Source: Cignoni et al. 2004, sections 3 and 4. Units: lattice units (geometry/lattice.h).
 
 #include <cstdint>
 #include <limits>
-#include <string>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "geometry/bounds.h"
@@ -25,25 +25,25 @@ using NodeIndex = uint32_t;
 inline constexpr NodeIndex kNoNode = std::numeric_limits<NodeIndex>::max();
 
 struct Node {
-    Sphere bounds;        ///< tight: encloses this node's patch
-    Sphere saturated;     ///< encloses all geometry of the group and of everything finer below it
-    float error = 0;      ///< proven two-sided distance to the input, monotone, the same in the group
-    NormalCone cone;      ///< of this patch's triangle normals
+    Sphere bounds;     ///< tight: encloses this node's patch
+    Sphere saturated;  ///< encloses all geometry of the group and of everything finer below it
+    float error = 0;   ///< proven two-sided distance to the input, monotone, the same in the group
+    NormalCone cone;   ///< of this patch's triangle normals
     NodeIndex child[2] = {kNoNode, kNoNode};  ///< kNoNode: none; a leaf has none
-    uint32_t group = 0;       ///< number of the diamond, unique in the model
-    uint32_t page = 0;        ///< which page holds the patch
-    uint16_t patch = 0;       ///< which patch of that page
-    uint16_t level = 0;       ///< depth in the hierarchy; roots are 0
-    uint32_t triangles = 0;   ///< of the patch
-    uint32_t vertices = 0;    ///< of the patch
-    bool closed = false;      ///< belongs to closed, consistently oriented components only: may be
-                              ///< culled by its cone, drawn one-sided
+    uint32_t group = 0;                       ///< number of the diamond, unique in the model
+    uint32_t page = 0;                        ///< which page holds the patch
+    uint16_t patch = 0;                       ///< which patch of that page
+    uint16_t level = 0;                       ///< depth in the hierarchy; roots are 0
+    uint32_t triangles = 0;                   ///< of the patch
+    uint32_t vertices = 0;                    ///< of the patch
+    bool closed = false;  ///< belongs to closed, consistently oriented components only: may be
+                          ///< culled by its cone, drawn one-sided
     bool isLeaf() const { return child[0] == kNoNode && child[1] == kNoNode; }
 };
 
 /// What a model says about itself, as stored in the file's header.
 struct ModelInfo {
-    std::string method;          ///< "tetra"
+    std::string method;  ///< "tetra"
     Lattice lattice;
     AttributeSchema schema;
     uint64_t input_triangles = 0;
@@ -51,8 +51,9 @@ struct ModelInfo {
     uint32_t input_files = 0;
     uint64_t dropped_degenerate = 0;
     uint64_t dropped_duplicate = 0;
-    float quantisation_error = 0;  ///< bound of the lattice snap, lattice units; part of every error
-    Box3i bounds;                  ///< lattice units
+    float quantisation_error =
+        0;         ///< bound of the lattice snap, lattice units; part of every error
+    Box3i bounds;  ///< lattice units
     uint32_t levels = 0;
     uint64_t triangles_stored = 0;
 };

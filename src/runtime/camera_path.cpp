@@ -1,5 +1,7 @@
 #include "runtime/camera_path.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "base/check.h"
@@ -24,6 +26,18 @@ Camera CameraPath::at(double t) const {
 Camera CameraPath::frame(int i, int frames) const {
     CHECK(i >= 0 && i < frames);
     return at(frames == 1 ? 0 : seconds * i / (frames - 1));
+}
+
+std::string cameraPathText(const CameraPath& path) {
+    const auto vector = [](const Vec3d& v) { return fmt::format("[{},{},{}]", v.x, v.y, v.z); };
+    std::string text = fmt::format("{{\"seconds\":{},\"keys\":[", path.seconds);
+    for (size_t i = 0; i < path.keys.size(); ++i) {
+        const Camera& c = path.keys[i].camera;
+        text += fmt::format("{}\n{{\"t\":{},\"eye\":{},\"target\":{},\"up\":{},\"fovy_deg\":{}}}",
+                            i ? "," : "", path.keys[i].t, vector(c.eye), vector(c.target),
+                            vector(c.up), c.fovy_deg);
+    }
+    return text + "\n]}\n";
 }
 
 }  // namespace pietra

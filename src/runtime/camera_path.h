@@ -2,6 +2,7 @@
 // A recorded flight: cameras at times, linear in between, so that frame i of N shows the same
 // picture on any machine at any speed.
 
+#include <string>
 #include <vector>
 
 #include "multires/view.h"
@@ -23,5 +24,8 @@ struct CameraPath {
     /// = 0.
     Camera frame(int i, int frames) const;
 };
+
+/// As the JSON that `bench --path` reads (apps/pietra/camera_json.h).
+std::string cameraPathText(const CameraPath& path);
 
 }  // namespace pietra

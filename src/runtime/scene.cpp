@@ -113,7 +113,7 @@ private:
     void evict(const PageKey& key);
     void adaptTolerance();
     bool mayBeInside(Model& model, const View& view);
-    void describe(const Model& model, uint32_t m, ModelFrame& out) const;
+    void describe(const Model& model, uint32_t m, bool show_error, ModelFrame& out) const;
 
     SceneSettings settings_;
     std::vector<std::unique_ptr<Model>> models_;
@@ -226,7 +226,7 @@ void Scene::Impl::select(const FrameRequest& request) {
                 used_bytes_ += model.page_bytes[page];
             }
         addRequests(m, out.selection.requests, false);
-        describe(model, m, out);
+        describe(model, m, request.show_error, out);
         frame_.tolerance_px = std::max(frame_.tolerance_px, out.selection.largest_px);
         frame_.triangles += out.selection.triangles;
         frame_.patch_count += out.patches.size();
@@ -344,7 +344,7 @@ bool Scene::Impl::mayBeInside(Model& model, const View& view) {
     return side.mayBeInside();
 }
 
-void Scene::Impl::describe(const Model& model, uint32_t m, ModelFrame& out) const {
+void Scene::Impl::describe(const Model& model, uint32_t m, bool show_error, ModelFrame& out) const {
     out.patches.clear();
     for (const NodeIndex i : out.selection.draw) {
         const Node& node = model.forest.node(i);
@@ -353,7 +353,8 @@ void Scene::Impl::describe(const Model& model, uint32_t m, ModelFrame& out) cons
         patch.mesh = &model.mesh(i);
         patch.one_sided = node.closed && !out.two_sided;
         patch.id = i + m * 0x9e3779b9u;
-        patch.value = float(node.level);
+        patch.value = show_error ? float(out.view.errorInPixels(node.error, node.saturated))
+                                 : float(node.level);
         out.patches.push_back(patch);
     }
 }

@@ -33,6 +33,7 @@ struct FrameRequest {
     double seconds = 0;  ///< since the beginning, for the prediction of where the camera goes
     Culling culling{true, true, true};
     bool prefetch = true;
+    bool show_error = false;  ///< DrawPatch::value is the error in pixels, not the level
 };
 
 /// What is drawn of a model.

@@ -61,6 +61,7 @@ TEST_F(SceneTest, settlesAtTheOfflineCut) {
         const FrameRequest request = flight(model, i);
         const Frame& frame = scene.converge(request);
         EXPECT_TRUE(frame.converged);
+        EXPECT_TRUE(scene.faults().empty()) << scene.faults().front();
         EXPECT_LE(frame.tolerance_px, request.pixels);
         const ModelFrame& drawn = frame.models[0];
         EXPECT_EQ(drawn.selection.draw,

@@ -10,7 +10,7 @@
 
 #include "geometry/mesh.h"
 #include "simplify/lanes4.h"
-#include "simplify/triangle_distance.h"
+#include "geometry/triangle_distance.h"
 
 namespace pietra::deviation {
 

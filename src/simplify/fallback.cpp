@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/disjoint_sets.h"
 #include "geometry/bounds.h"
 
 namespace pietra {
@@ -42,26 +43,6 @@ bool hasArea(const WorkingMesh& mesh, const Face& face) {
     return p.y * q.z != p.z * q.y || p.z * q.x != p.x * q.z || p.x * q.y != p.y * q.x;
 }
 
-/// Union-find over the faces.
-class FaceSets {
-public:
-    explicit FaceSets(size_t count) : parent_(count) {
-        for (uint32_t f = 0; f < count; ++f) parent_[f] = f;
-    }
-    uint32_t root(uint32_t f) {
-        while (parent_[f] != f) f = parent_[f] = parent_[parent_[f]];
-        return f;
-    }
-    void unite(uint32_t a, uint32_t b) {
-        a = root(a);
-        b = root(b);
-        if (a != b) parent_[std::max(a, b)] = std::min(a, b);
-    }
-
-private:
-    std::vector<uint32_t> parent_;
-};
-
 }  // namespace
 
 void Fallback::allowForLocks(WorkingMesh& mesh) {
@@ -87,7 +68,7 @@ void Fallback::relaxQuotas(WorkingMesh& mesh, float factor) {
 // opening anything. In the order of their first triangle.
 std::vector<Fallback::Component> Fallback::findComponents(const WorkingMesh& mesh) {
     pinBorderTriangles(mesh);
-    FaceSets sets(mesh.face.size());
+    DisjointSets sets(mesh.face.size());
     for (size_t i = 1; i < edges_.size(); ++i)
         if (edges_[i].key == edges_[i - 1].key)
             sets.unite(edges_[i].corner >> 2, edges_[i - 1].corner >> 2);

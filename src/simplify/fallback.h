@@ -22,16 +22,16 @@ public:
     void relaxQuotas(WorkingMesh& mesh, float factor);
 
     /// Drops components, triangles that hang together over edges, that lie wholly in this mesh and
-    /// have a box diagonal below `diameter`, smallest first, from cells above their quota; never the
-    /// one of the largest diagonal. Returns the number of triangles dropped.
+    /// have a box diagonal below `diameter`, smallest first, from cells above their quota; never
+    /// the one of the largest diagonal. Returns the number of triangles dropped.
     uint32_t dropComponents(WorkingMesh& mesh, float diameter);
 
     /// Merges vertices of cells above their quota that lie in one box of a grid of spacing
     /// `spacing`, into one of them; repeats with a coarser grid until the quotas are met or one box
-    /// holds all. Degenerate triangles go, and doubled ones in pairs, so that no edge is left with an
-    /// odd number of triangles: no hole appears, but sheets may grow together. Outer vertices, those
-    /// on borders and on non-manifold edges stay. Returns the number of vertices merged; `spacing`
-    /// becomes that of the last grid.
+    /// holds all. Degenerate triangles go, and doubled ones in pairs, so that no edge is left with
+    /// an odd number of triangles: no hole appears, but sheets may grow together. Outer vertices,
+    /// those on borders and on non-manifold edges stay. Returns the number of vertices merged;
+    /// `spacing` becomes that of the last grid.
     uint32_t clusterVertices(WorkingMesh& mesh, float& spacing);
 
 private:

@@ -27,12 +27,12 @@ public:
         }
         return *at_++;
     }
-    /// The next `count` numbers; null if there are not so many.
-    const uint32_t* take(size_t count) {
-        if (size_t(end_ - at_) < count) return nullptr;
-        const uint32_t* taken = at_;
+    /// The next `count` numbers; false if there are not so many.
+    [[nodiscard]] bool take(size_t count, std::span<const uint32_t>& numbers) {
+        if (size_t(end_ - at_) < count) return false;
+        numbers = {at_, count};
         at_ += count;
-        return taken;
+        return true;
     }
     /// All were handed out, and no more were asked for.
     bool spent() const { return at_ == end_ && !missing_; }
@@ -292,8 +292,8 @@ bool FrontDecoder::readEdgeClasses(Mesh& mesh) {
     const size_t n = patch_.triangle.size();
     mesh.edge_class.assign(n, 0);
     if (!has_classes_) return true;
-    const uint32_t* classes = in_[kEdgeClasses].take(n);
-    if (classes == nullptr) return false;
+    std::span<const uint32_t> classes;
+    if (!in_[kEdgeClasses].take(n, classes)) return false;
     uint32_t any = 0;
     for (size_t i = 0; i < n; ++i) {
         any |= classes[i];
@@ -327,9 +327,9 @@ bool FrontDecoder::readNormals(Mesh& mesh) {
             mesh.normal[v] = restore(v, code_x, in_[kBorderNormalY].next());
         }
     }
-    const uint32_t *code_x = in_[kNormalX].take(n - border),
-                   *code_y = in_[kNormalY].take(n - border);
-    if (code_x == nullptr || code_y == nullptr) return false;
+    std::span<const uint32_t> code_x, code_y;
+    if (!in_[kNormalX].take(n - border, code_x) || !in_[kNormalY].take(n - border, code_y))
+        return false;
     for (uint32_t v = border; v < n; ++v)
         mesh.normal[v] = restore(v, code_x[v - border], code_y[v - border]);
     return bad == 0;

@@ -38,6 +38,23 @@ def read_ply(data):
     return names, vertices, triangles
 
 
+def read_floats(data):
+    """Vertices and triangles of what write_torus() writes."""
+    head, body = data.split(b"end_header\n", 1)
+    count = int(head.split(b"element vertex ")[1].split()[0])
+    return (list(struct.iter_unpack("<fff", body[:12 * count])),
+            [t[1:] for t in struct.iter_unpack("<BIII", body[12 * count:])])
+
+
+def mesh_text(vertices, triangles):
+    """An ASCII PLY."""
+    head = ["ply", "format ascii 1.0", f"element vertex {len(vertices)}", "property float x",
+            "property float y", "property float z", f"element face {len(triangles)}",
+            "property list uchar int vertex_indices", "end_header"]
+    rows = ["%.9g %.9g %.9g" % v for v in vertices] + ["3 %d %d %d" % t for t in triangles]
+    return "\n".join(head + rows) + "\n"
+
+
 def edge_uses(triangles):
     """How many edges are used by how many triangles, without regard to direction."""
     uses = collections.Counter()
@@ -196,6 +213,37 @@ class Shown(VerbTest):
         self.render("left.png", "--light", "-1,0,0")
         self.report("compare", "none.png", "left.png", "--json", "--max-shade", "8", code=6)
 
+    def test_only_closed_components_are_culled_by_their_normals(self):
+        write_torus(self.path("torus.ply"), 150, 60)
+        vertices, triangles = read_floats(self.read("torus.ply"))
+        side, first = 40, len(vertices)  # an open sheet below, a little bent
+        for i in range(side + 1):
+            for j in range(side + 1):
+                x, y = 10 * i / side - 5, 10 * j / side - 5
+                vertices.append((x, y, -4 + 0.02 * x * y))
+        for i in range(side):
+            for j in range(side):
+                a = first + i * (side + 1) + j
+                triangles += [(a, a + side + 1, a + 1), (a + 1, a + side + 1, a + side + 2)]
+        self.write("mixed.ply", mesh_text(vertices, triangles))
+        self.report("build", "mixed.ply", "-o", "mixed.pietra", "--leaf-triangles", "300",
+                    "--patch-triangles", "200", "--report", "-")
+        for name, eye in (("above", [6, -9, 11]), ("below", [6, -9, -16])):
+            self.write("c.json", json.dumps({"eye": eye, "target": [0, 0, -2], "up": [0, 0, 1],
+                                             "fovy_deg": 45}))
+            for pixels in ("0", "2"):
+                def shown(picture, *arguments):
+                    return self.render(picture, "--force", "--camera", "c.json", "--pixels", pixels,
+                                       *arguments, models=["mixed.pietra"])["triangles"]
+                all_of_it = shown("none.png", "--cull", "none")
+                fewer = shown("cone.png", "--cull", "cone")
+                self.assertEqual(self.read("cone.png"), self.read("none.png"), (name, pixels))
+                if pixels == "0":
+                    self.assertLess(fewer, all_of_it)
+                # Nor is anything left out for being seen from behind.
+                shown("both.png", "--cull", "none", "--two-sided")
+                self.report("compare", "none.png", "both.png", "--json", "--max-px", "1")
+
     def test_every_view_of_the_attributes(self):
         pictures = set()
         for show in ("shaded", "normals", "depth", "lod", "patches", "triangles", "error", "colour",
@@ -229,6 +277,38 @@ class Shown(VerbTest):
         refuse(start + ["--light", "0,0,0"], 2, "render: --light: '0,0,0' is no direction" + end)
         refuse(start + ["--camera", "c.json", "--view", "top"], 2,
                "--camera and --view exclude each other: give one")
+
+    def test_bench_on_every_path(self):
+        for path in ("orbit", "dive", "flight", "jumps"):
+            r = self.report("bench", "statue.pietra", "--path", path, "--frames", "12", "--size",
+                            "160x120", "--report", "-")
+            self.assertEqual(len(r["frames"]), 12)
+            self.assertEqual(r["summary"]["frames"], 12)
+            self.assertGreater(r["summary"]["first_image_ms"], 0)
+            self.assertGreaterEqual(r["summary"]["converged_ms"], 0)
+            self.assertGreater(max(f["triangles"] for f in r["frames"]), 0)
+        undrawn = self.report("bench", "statue.pietra", "--path", "orbit", "--frames", "5",
+                              "--renderer", "none", "--prefetch", "off", "--report", "-")
+        self.assertEqual(undrawn["frames"][0]["draw_ms"], 0)
+        self.assertRefused(["bench", "statue.pietra", "--path", "orbit", "--ram", "1K"], 5,
+                           self.run_pietra("bench", "statue.pietra", "--path", "orbit", "--ram",
+                                           "1K").stderr[len("pietra: "):-1])
+        self.assertRefused(["bench", "statue.pietra", "--path", "none.json"], 4,
+                           "none.json: cannot open: No such file or directory")
+
+    def test_view_does_as_a_script_says(self):
+        self.write("s.txt", "# turn it\nwait\nscreenshot a.png\ndrag left 200 150 300 180\n"
+                   "wheel 3 200 150\nkey 5\nwait\nscreenshot b.png\nquit\n")
+        screen = {"SDL_VIDEODRIVER": "offscreen"}
+        run = self.run_pietra("view", "statue.pietra", "--size", "400x300", "--script", "s.txt",
+                              env=screen)
+        self.assertEqual((run.returncode, run.stdout), (0, ""), run.stderr)
+        moved = self.report("compare", "a.png", "b.png", "--json")
+        self.assertGreater(moved["shade"]["p99"], 20)
+        self.write("bad.txt", "wait\njump\n")
+        run = self.run_pietra("view", "statue.pietra", "--script", "bad.txt", env=screen)
+        self.assertEqual((run.returncode, run.stderr),
+                         (3, "pietra: bad.txt: line 2: 'jump' is no command\n"))
 
     def test_compare_finds_what_has_moved(self):
         for name, x in (("a", 0.0), ("b", 0.0), ("c", 0.05)):

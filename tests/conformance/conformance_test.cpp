@@ -45,7 +45,7 @@ std::string bytesOf(const std::string& path) {
 
 const std::vector<ConformanceMesh>& meshes() {
     static const std::vector<ConformanceMesh> all = {closedMesh(45), borderedMesh(110),
-                                                     nonManifoldMesh(60), dustMesh(6000)};
+                                                     nonManifoldMesh(), dustMesh(6000)};
     return all;
 }
 
@@ -131,8 +131,7 @@ TEST_P(Conformance, finestCutIsTheInput) {
     for (const auto& t : mesh().triangles) {
         Key key;
         for (size_t k = 0; k < 3; ++k) {
-            const Vec3d q = lattice.toLattice(mesh().vertices.position[t[k]]);
-            key[k] = latticeKey(snapToShift(Vec3i(glm::floor(q + 0.5)), lattice.shift));
+            key[k] = latticeKey(lattice.snap(mesh().vertices.position[t[k]]));
         }
         key = sorted(key);
         if (key[0] != key[1] && key[1] != key[2]) expected.insert(key);

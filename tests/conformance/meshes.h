@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "audit/conformance_inputs.h"
 #include "base/hash.h"
 #include "io/memory_source.h"
 
@@ -50,30 +51,13 @@ void addGrid(ConformanceMesh& mesh, int n, Height&& height, Hole&& hole) {
         }
 }
 
-/// A closed, dented sphere: a cube's surface, n x n quads a face, pushed outward.
+inline ConformanceMesh named(const std::string& name, const MemorySource& mesh) {
+    return {name, mesh.attributes, mesh.vertices, mesh.triangles};
+}
+
+/// A closed, dented sphere.
 inline ConformanceMesh closedMesh(int n) {
-    ConformanceMesh mesh;
-    mesh.name = "closed";
-    for (int axis = 0; axis < 3; ++axis)
-        for (int side : {0, 1}) {
-            const size_t first = mesh.vertices.position.size();
-            const size_t first_triangle = mesh.triangles.size();
-            addGrid(mesh, n, [](double, double) { return 0.0; }, [](int, int) { return false; });
-            for (size_t v = first; v < mesh.vertices.position.size(); ++v) {
-                const Vec3d uv = mesh.vertices.position[v];
-                Vec3d p;
-                p[axis] = side;
-                p[(axis + 1) % 3] = uv.x;
-                p[(axis + 2) % 3] = uv.y;
-                p = glm::normalize(p - 0.5);
-                mesh.vertices.position[v] =
-                    p * (1 + 0.1 * p.x * p.y + 0.08 * std::floor(3 * p.z + 0.5) + 0.01 * noiseAt(p));
-            }
-            if (side == 0)
-                for (size_t t = first_triangle; t < mesh.triangles.size(); ++t)
-                    std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
-        }
-    return mesh;
+    return named("closed", inputs::ball(n, 0.2));
 }
 
 /// A bordered terrain with a hole, colours and a scalar.
@@ -89,31 +73,16 @@ inline ConformanceMesh borderedMesh(int n) {
         },
         [n](int x, int y) { return x > n / 3 && x < n / 2 && y > n / 4 && y < n / 2; });
     for (const Vec3d& p : mesh.vertices.position) {
-        mesh.vertices.colour.push_back({uint8_t(p.x * 255), uint8_t(p.y * 255),
-                                        uint8_t(p.x > 0.5 ? 255 : 0), 255});
+        mesh.vertices.colour.push_back(
+            {uint8_t(p.x * 255), uint8_t(p.y * 255), uint8_t(p.x > 0.5 ? 255 : 0), 255});
         mesh.vertices.scalar.push_back(float(p.z));
     }
     return mesh;
 }
 
-/// Three sheets that meet in a line, two that cross without sharing anything, one folded flat.
-inline ConformanceMesh nonManifoldMesh(int n) {
-    ConformanceMesh mesh;
-    mesh.name = "non-manifold";
-    for (int sheet = 0; sheet < 3; ++sheet) {
-        const size_t first = mesh.vertices.position.size();
-        addGrid(mesh, n, [](double x, double y) { return 0.01 * noiseAt({x, y, 1}) * x; },
-                [](int, int) { return false; });
-        for (size_t v = first; v < mesh.vertices.position.size(); ++v) {
-            const Vec3d p = mesh.vertices.position[v];  // the line x = 0 is common to all
-            const Vec3d along = sheet == 0   ? Vec3d(p.x, p.y, p.z)
-                                : sheet == 1 ? Vec3d(p.z, p.y, p.x)
-                                             : Vec3d(-p.x, p.y, p.z - p.x * 0.5);
-            mesh.vertices.position[v] = p.x == 0 ? Vec3d(0, p.y, 0) : along;
-        }
-    }
-    addGrid(mesh, n, [](double x, double) { return x * 0.7 - 0.3; }, [](int, int) { return false; });
-    return mesh;
+/// Sheets that meet in lines, and a Moebius strip.
+inline ConformanceMesh nonManifoldMesh() {
+    return named("non-manifold", inputs::nonManifold());
 }
 
 /// Thousands of loose tetrahedra and single triangles.
@@ -125,8 +94,7 @@ inline ConformanceMesh dustMesh(int count) {
     for (int i = 0; i < count; ++i) {
         const Vec3d centre(uniform(), uniform() * uniform(), uniform());
         uint64_t v[4];
-        for (uint64_t& k : v)
-            k = mesh.add(centre + 0.004 * Vec3d(uniform(), uniform(), uniform()));
+        for (uint64_t& k : v) k = mesh.add(centre + 0.004 * Vec3d(uniform(), uniform(), uniform()));
         mesh.triangles.push_back({v[0], v[1], v[2]});
         if (i % 3 == 0) continue;
         mesh.triangles.push_back({v[0], v[3], v[1]});

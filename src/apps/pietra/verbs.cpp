@@ -9,6 +9,7 @@ VerbTable makeVerbs() {
     verbs.push_back(makeCheckVerb());
     verbs.push_back(makeExtractVerb());
     verbs.push_back(makeRenderVerb());
+    verbs.push_back(makeViewVerb());
     verbs.push_back(makeBenchVerb());
     verbs.push_back(makeCompareVerb());
     verbs.push_back(makeSynthVerb());

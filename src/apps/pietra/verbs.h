@@ -13,6 +13,7 @@ std::unique_ptr<Verb> makeInfoVerb();
 std::unique_ptr<Verb> makeCheckVerb();
 std::unique_ptr<Verb> makeExtractVerb();
 std::unique_ptr<Verb> makeRenderVerb();
+std::unique_ptr<Verb> makeViewVerb();
 std::unique_ptr<Verb> makeBenchVerb();
 std::unique_ptr<Verb> makeCompareVerb();
 std::unique_ptr<Verb> makeSynthVerb();

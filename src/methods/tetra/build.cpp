@@ -73,6 +73,7 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
     LeafSettings leaf_settings;
     leaf_settings.leaf_triangles = settings.leaf_triangles;
     leaf_settings.bound = vertices.quantisationError();
+    leaf_settings.component_bytes = plan.work / 16;
     Leaves leaves = buildLeaves(partition, record, leaf_settings, space, leaf_store, progress);
 
     LevelSettings level_settings{settings.patch_triangles, vertices.lattice().shift,

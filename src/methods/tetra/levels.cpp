@@ -89,7 +89,7 @@ private:
     void runLeaf(const Item& item, const CellMesh& mesh, UnitResult& result, Worker& worker) const;
     void runDiamond(const Item& item, int level, DiamondOutput& output, UnitResult& result,
                     Worker& worker);
-    Node describe(const Mesh& mesh, Worker& worker) const;
+    static Node describe(const CellMesh& cell, Worker& worker);
     void write(UnitResult& result);
 
     Leaves& leaves_;
@@ -193,11 +193,12 @@ UnitResult LevelBuilder::runUnit(std::span<const Item> items, int level) {
     return result;
 }
 
-Node LevelBuilder::describe(const Mesh& mesh, Worker& worker) const {
+Node LevelBuilder::describe(const CellMesh& cell, Worker& worker) {
+    const Mesh& mesh = cell.mesh;
     Node node;
     node.triangles = uint32_t(mesh.triangleCount());
     node.vertices = uint32_t(mesh.vertexCount());
-    node.closed = leaves_.isClosed();
+    node.closed = cell.closed;
     node.bounds = enclosingBall(std::span<const Vec3i>(mesh.position));
     worker.normals.clear();
     for (const Triangle& t : mesh.triangle) {
@@ -212,7 +213,7 @@ Node LevelBuilder::describe(const Mesh& mesh, Worker& worker) const {
 
 void LevelBuilder::runLeaf(const Item& item, const CellMesh& mesh, UnitResult& result,
                            Worker& worker) const {
-    Node node = describe(mesh.mesh, worker);
+    Node node = describe(mesh, worker);
     node.saturated = node.bounds;
     node.error = settings_.quantisation_error;
     result.nodes.push_back(node);
@@ -245,7 +246,7 @@ void LevelBuilder::runDiamond(const Item& item, int level, DiamondOutput& output
 
     const size_t first = result.nodes.size();
     for (size_t c = 0; c < item.cells.size(); ++c) {
-        Node node = describe(output.cells[c].mesh, worker);
+        Node node = describe(output.cells[c], worker);
         for (int bit : {0, 1})
             if (const auto child = below_.find(cellChild(item.cells[c], bit));
                 child != below_.end())
@@ -283,7 +284,7 @@ void LevelBuilder::write(UnitResult& result) {
 }  // namespace
 
 LevelCounts buildLevels(Leaves& leaves, const LevelSettings& settings, TempSpace& space,
-                     ModelWriter& writer, Progress& progress) {
+                        ModelWriter& writer, Progress& progress) {
     return LevelBuilder(leaves, settings, space, writer, progress).run();
 }
 

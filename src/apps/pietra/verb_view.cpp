@@ -1,0 +1,88 @@
+// pietra view: a window that looks at models.
+
+#include <fmt/format.h>
+
+#include "apps/pietra/limits.h"
+#include "apps/pietra/model_files.h"
+#include "apps/pietra/verbs.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "base/text.h"
+#include "viewer/viewer.h"
+
+namespace pietra {
+
+namespace {
+
+class ViewVerb : public Verb {
+public:
+    VerbText text() const override;
+    void declare(OptionSet& options) override;
+    int run(const RunContext& context) override;
+
+private:
+    std::vector<std::string> files_;
+    PictureSize size_{1280, 800};
+    double pixels_ = 1;
+    std::string renderer_ = "cpu";
+    std::string up_ = "z";
+    std::string script_;
+    uint64_t ram_ = uint64_t(1) << 30;
+    std::optional<uint64_t> jobs_;
+};
+
+VerbText ViewVerb::text() const {
+    return {
+        "view",
+        "look at models in a window",
+        {"FILE... [options]"},
+        {"Opens a window at once, and shows the models as finely as --pixels asks for. What has "
+         "not been loaded yet is drawn coarser, without holes. No graphics card is needed.",
+         "F1 in the window lists what mouse and keys do."},
+        {{"look at a model", "pietra view moon.pietra"},
+         {"two models in one scene, within 512 MB", "pietra view a.pietra b.pietra --ram 512M"}}};
+}
+
+void ViewVerb::declare(OptionSet& options) {
+    options.files("FILE", files_, "The models.").require();
+    options.pictureSize("--size", size_, "Of the window, in pixels.");
+    options.number("--pixels", "T", pixels_, {.min = 0.25, .max = 64}, "Tolerance in pixels.");
+    options.choice("--renderer", renderer_, {"cpu", "gl"}, "What draws.");
+    options.choice("--up", up_, {"y", "z"}, "Which axis points up.");
+    options.size("--ram", ram_, "Most memory for what is loaded.");
+    options.text(
+        "--script", "FILE", script_,
+        "Do what the file says as if a user did, a command a line: wait, key F, drag left "
+        "X0 Y0 X1 Y1, click left X Y, double X Y, wheel N X Y, screenshot FILE.png, quit.");
+    options.count("-j,--jobs", "N", jobs_, {.min = 1, .max = 1024}, "Threads to work with.")
+        .defaultsTo("all cores");
+}
+
+int ViewVerb::run(const RunContext&) {
+    if (renderer_ == "gl")
+        throw UsageError("--renderer gl: the viewer draws on the processor so far; use cpu");
+    const ThreadLimit threads(Limits{{}, jobs_}.threads());
+    const ModelFiles files(files_);
+    ViewerSettings settings;
+    settings.size = size_;
+    settings.pixels = pixels_;
+    settings.up = up_ == "y" ? UpAxis::kY : UpAxis::kZ;
+    settings.scene.ram_bytes = size_t(ram_);
+    settings.title = files_.size() == 1 ? fmt::format("{} - Pietra", files_[0])
+                                        : fmt::format("{} models - Pietra", files_.size());
+    settings.script = script_;
+    try {
+        runViewer(files.views(), settings);
+    } catch (const MemoryError& error) {
+        throw MemoryError(fmt::format("--ram {}: {}", formatBytes(ram_), error.what()));
+    }
+    return 0;
+}
+
+}  // namespace
+
+std::unique_ptr<Verb> makeViewVerb() {
+    return std::make_unique<ViewVerb>();
+}
+
+}  // namespace pietra

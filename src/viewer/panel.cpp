@@ -1,0 +1,105 @@
+#include "viewer/panel.h"
+
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include "base/text.h"
+
+namespace pietra {
+namespace {
+
+constexpr const char* kHelp =
+    "left drag       turn around the pivot\n"
+    "right drag      pan\n"
+    "wheel           towards what is under the cursor\n"
+    "double click    make that point the pivot\n"
+    "middle drag     look around\n"
+    "arrows, PgUp/Dn fly\n"
+    "F               show the whole\n"
+    "T               turntable or trackball\n"
+    "[ ]             tolerance\n"
+    "1 to 8          shaded, normals, depth, level, patches,\n"
+    "                triangles, error, colours\n"
+    "A               1 or 4 samples a pixel\n"
+    "L + drag        move the light\n"
+    "Z               freeze what is selected\n"
+    "D               measure a distance by two clicks\n"
+    "C               record the camera's path\n"
+    "P               save a picture\n"
+    "Tab, F1         this panel, this help\n"
+    "Esc             quit";
+
+void text(const std::string& line) {
+    ImGui::TextUnformatted(line.c_str());
+}
+
+void drawFigures(const FrameFigures& figures) {
+    const float last =
+        figures.ms[size_t((figures.next + FrameFigures::kHistory - 1) % FrameFigures::kHistory)];
+    ImGui::PlotLines("##ms", figures.ms.data(), FrameFigures::kHistory, figures.next, nullptr, 0,
+                     100, ImVec2(250, 40));
+    text(fmt::format("{:.1f} ms a frame, drawing {:.1f} ms", last, figures.draw_ms));
+    text(fmt::format("{} triangles in {} patches", formatCount(double(figures.triangles)),
+                     figures.patches));
+    text(fmt::format("memory {} of {}", formatBytes(figures.resident_bytes),
+                     formatBytes(figures.ram_bytes)));
+    text(fmt::format("read {}", formatBytes(figures.bytes_read)));
+    text(fmt::format("within {:.3g} px{}", figures.tolerance_px,
+                     figures.converged ? "" : ", loading"));
+}
+
+void drawSettings(ViewState& state, const CameraControl& control) {
+    float pixels = float(state.pixels);
+    ImGui::SetNextItemWidth(150);
+    if (ImGui::SliderFloat("tolerance", &pixels, 0.25f, 16, "%.2f px",
+                           ImGuiSliderFlags_Logarithmic))
+        state.pixels = double(pixels);
+    static constexpr const char* kShows[] = {"shaded",  "normals",   "depth", "level",
+                                             "patches", "triangles", "error", "colours"};
+    int show = int(state.show);
+    ImGui::SetNextItemWidth(150);
+    if (ImGui::Combo("show", &show, kShows, 8)) state.show = Show(show);
+    bool four = state.samples == 4;
+    if (ImGui::Checkbox("4 samples a pixel", &four)) state.samples = four ? 4 : 1;
+    ImGui::Checkbox("prefetch", &state.prefetch);
+    ImGui::SameLine();
+    ImGui::Checkbox("frozen", &state.frozen);
+    text(control.style() == CameraControl::Style::kTurntable ? "turntable" : "trackball");
+    if (state.recording) text("recording the path: C ends");
+    if (state.measuring)
+        text(state.measured_count < 2
+                 ? fmt::format("distance: click point {}", state.measured_count + 1)
+                 : fmt::format("distance {:.9g}",
+                               glm::length(state.measured[1] - state.measured[0])));
+}
+
+}  // namespace
+
+void drawPanel(ViewState& state, const FrameFigures& figures, const CameraControl& control,
+               const std::vector<std::string>& faults) {
+    if (state.show_panel) {
+        ImGui::SetNextWindowPos(ImVec2(10, 10), ImGuiCond_Once);
+        ImGui::SetNextWindowBgAlpha(0.75f);
+        ImGui::Begin("Pietra", &state.show_panel,
+                     ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing);
+        drawFigures(figures);
+        ImGui::Separator();
+        drawSettings(state, control);
+        if (!state.message.empty()) {
+            ImGui::Separator();
+            text(state.message);
+        }
+        for (const std::string& fault : faults) text(fault);
+        text("F1: help");
+        ImGui::End();
+    }
+    if (state.show_help) {
+        ImGui::SetNextWindowPos(ImVec2(320, 10), ImGuiCond_Once);
+        ImGui::SetNextWindowBgAlpha(0.85f);
+        ImGui::Begin("Help", &state.show_help, ImGuiWindowFlags_AlwaysAutoResize);
+        text(kHelp);
+        ImGui::End();
+    }
+}
+
+}  // namespace pietra

@@ -1,0 +1,51 @@
+#pragma once
+// What the window shows beside the picture: figures, settings, help.
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "render/shading.h"
+#include "runtime/scene.h"
+#include "viewer/camera_control.h"
+
+namespace pietra {
+
+/// Set by keys and by the panel's own controls.
+struct ViewState {
+    double pixels = 1;
+    int samples = 1;
+    Show show = Show::kShaded;
+    bool prefetch = true;
+    bool show_panel = true, show_help = false;
+    bool frozen = false;  ///< what is drawn stays as selected, wherever the camera goes
+    bool recording = false;
+    bool measuring = false;
+    std::array<Vec3d, 2> measured{};
+    int measured_count = 0;
+    std::string message;  ///< of what was done last
+};
+
+/// Of the last frames.
+struct FrameFigures {
+    static constexpr int kHistory = 120;
+    std::array<float, kHistory> ms{};
+    int next = 0;
+    double draw_ms = 0;
+    double tolerance_px = 0;
+    bool converged = false;
+    uint64_t triangles = 0, patches = 0;
+    size_t resident_bytes = 0, ram_bytes = 0;
+    uint64_t bytes_read = 0;
+
+    void add(float frame_ms) {
+        ms[size_t(next)] = frame_ms;
+        next = (next + 1) % kHistory;
+    }
+};
+
+/// Within an ImGui frame.
+void drawPanel(ViewState& state, const FrameFigures& figures, const CameraControl& control,
+               const std::vector<std::string>& faults);
+
+}  // namespace pietra

@@ -1,0 +1,503 @@
+#include "viewer/viewer.h"
+
+#include <SDL.h>
+#include <backends/imgui_impl_sdl.h>
+#include <fmt/format.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+
+#include "base/error.h"
+#include "render/raster/rasteriser.h"
+#include "runtime/camera_path.h"
+#include "viewer/imgui_draw.h"
+#include "viewer/panel.h"
+#include "viewer/script.h"
+
+namespace pietra {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kFluentMs = 40;      // frames in motion may take this long
+constexpr double kMostCoarsened = 8;  // by which the tolerance is raised for that, at most
+constexpr double kAtRestSeconds = 0.15;
+constexpr double kRecordSeconds = 0.1;  // between two keys of a recorded path
+constexpr double kZoomStep = 0.85;
+
+double secondsSince(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+template <auto kDestroy>
+struct Destroy {
+    template <class T>
+    void operator()(T* object) const {
+        kDestroy(object);
+    }
+};
+using Window = std::unique_ptr<SDL_Window, Destroy<SDL_DestroyWindow>>;
+using Renderer = std::unique_ptr<SDL_Renderer, Destroy<SDL_DestroyRenderer>>;
+using Texture = std::unique_ptr<SDL_Texture, Destroy<SDL_DestroyTexture>>;
+
+/// SDL and Dear ImGui, from beginning to end.
+class Toolkit {
+public:
+    Toolkit(const std::string& title, const PictureSize& size) {
+        SDL_SetHint(SDL_HINT_VIDEO_X11_NET_WM_BYPASS_COMPOSITOR, "0");
+        if (SDL_Init(SDL_INIT_VIDEO) != 0)
+            throw UsageError(fmt::format("no window can be opened: {}", SDL_GetError()));
+        window.reset(SDL_CreateWindow(title.c_str(), SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED,
+                                      size.width, size.height,
+                                      SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI));
+        if (window) renderer.reset(SDL_CreateRenderer(window.get(), -1, 0));
+        if (!renderer) throw UsageError(fmt::format("no window can be opened: {}", SDL_GetError()));
+        ImGui::CreateContext();
+        ImGui::GetIO().IniFilename = nullptr;
+        ImGui::StyleColorsDark();
+        ImGui_ImplSDL2_InitForSDLRenderer(window.get());
+        imgui.emplace(renderer.get());
+    }
+    ~Toolkit() {
+        if (renderer) {
+            imgui.reset();
+            ImGui_ImplSDL2_Shutdown();
+            ImGui::DestroyContext();
+        }
+        renderer.reset();
+        window.reset();
+        SDL_Quit();
+    }
+
+    PictureSize pictureSize() const {
+        PictureSize size;
+        SDL_GetRendererOutputSize(renderer.get(), &size.width, &size.height);
+        return {std::clamp(size.width, 16, kMaxPictureSide),
+                std::clamp(size.height, 16, kMaxPictureSide)};
+    }
+
+    Window window;
+    Renderer renderer;
+    std::optional<ImguiDraw> imgui;
+};
+
+/// What is around all models, in input coordinates.
+Box3d boundsOf(const std::vector<const ModelReader*>& models) {
+    Box3d box;
+    for (const ModelReader* model : models) {
+        box.add(model->info().lattice.toInput(model->info().bounds.min));
+        box.add(model->info().lattice.toInput(model->info().bounds.max));
+    }
+    return box;
+}
+
+/// A name that is not taken: `stem`-1.`ending` and so on, in the current folder.
+std::string freeName(const char* stem, const char* ending) {
+    for (int i = 1;; ++i)
+        if (std::string name = fmt::format("{}-{}.{}", stem, i, ending);
+            !std::filesystem::exists(name))
+            return name;
+}
+
+class Viewer {
+public:
+    Viewer(const std::vector<const ModelReader*>& models, const ViewerSettings& settings)
+        : models_(models),
+          settings_(settings),
+          toolkit_(settings.title, settings.size),
+          scene_(models, settings.scene),
+          control_(boundsOf(models), settings.up,
+                   standardCamera(StandardView::kFront, settings.up, boundsOf(models),
+                                  toolkit_.pictureSize())) {
+        if (!settings.script.empty()) script_ = Script(settings.script);
+        state_.pixels = settings.pixels;
+        figures_.ram_bytes = settings.scene.ram_bytes;
+    }
+
+    void run() {
+        while (!quit_) {
+            const auto start = Clock::now();
+            handleEvents();
+            flyByKeys();
+            if (!ready()) drawScene();
+            present();
+            last_frame_ = secondsSince(start);
+            if (!ready()) figures_.add(float(1e3 * last_frame_));
+            record();
+        }
+    }
+
+private:
+    void handleEvents();
+    void runScript();
+    void handle(const SDL_Event& event);
+    void handleKey(SDL_Keycode key);
+    void handleDrag(const SDL_MouseMotionEvent& motion);
+    void handleClick(const SDL_MouseButtonEvent& button);
+    void zoomTo(int steps);
+    void flyByKeys();
+    void setPixels(double pixels);
+    void touch() { touched_ = Clock::now(); }
+    bool moving() const { return secondsSince(touched_) < kAtRestSeconds; }
+    /// The picture on the screen is the one asked for.
+    bool ready() const { return drawn_ && figures_.converged && !moving(); }
+
+    void drawScene();
+    ShadeSettings shade() const;
+    void adaptToMotion();
+    void present();
+    std::optional<Vec3d> pointAt(int x, int y) const;
+    Vec2d pictureCursor() const;
+    void savePicture();
+    void saveWindow(const std::string& file);
+    void record();
+    void toggleRecording();
+
+    std::vector<const ModelReader*> models_;
+    ViewerSettings settings_;
+    Toolkit toolkit_;
+    Scene scene_;
+    CameraControl control_;
+    Script script_;
+    ViewState state_;
+    FrameFigures figures_;
+    std::optional<Rasteriser> rasteriser_;
+    int rasteriser_samples_ = 0;
+    const Picture* picture_ = nullptr;
+    Texture texture_;
+    PictureSize texture_size_{0, 0};
+    Vec3d light_ = ShadeSettings{}.light_direction;
+    bool light_key_ = false;
+    double motion_factor_ = 1;
+    double last_frame_ = 0;
+    bool drawn_ = false, quit_ = false;
+    Clock::time_point start_ = Clock::now(), touched_ = Clock::now(), last_key_{};
+    Camera frozen_camera_;
+    CameraPath path_;
+    double path_start_ = 0;
+    int cursor_x_ = 0, cursor_y_ = 0;
+};
+
+void Viewer::handleEvents() {
+    runScript();
+    SDL_Event event;
+    // At rest there is nothing to do until something happens.
+    if (ready() && script_.done() && !state_.recording && SDL_WaitEventTimeout(&event, 100))
+        handle(event);
+    while (SDL_PollEvent(&event)) handle(event);
+}
+
+void Viewer::runScript() {
+    if (script_.done()) return;
+    const Script::Step step = script_.front();
+    if (step.kind != Script::Step::Kind::kEvent && !ready()) return;
+    script_.pop();
+    if (step.kind == Script::Step::Kind::kScreenshot) saveWindow(step.file);
+    if (step.kind == Script::Step::Kind::kEvent) handle(step.event);
+}
+
+void Viewer::handle(const SDL_Event& event) {
+    ImGui_ImplSDL2_ProcessEvent(&event);
+    const ImGuiIO& io = ImGui::GetIO();
+    const bool over_panel =
+        io.WantCaptureMouse && ImGui::IsWindowHovered(ImGuiHoveredFlags_AnyWindow);
+    switch (event.type) {
+        case SDL_QUIT:
+            quit_ = true;
+            break;
+        case SDL_WINDOWEVENT:
+            touch();
+            break;
+        case SDL_MOUSEMOTION:
+            if (!over_panel) handleDrag(event.motion);
+            cursor_x_ = event.motion.x;
+            cursor_y_ = event.motion.y;
+            break;
+        case SDL_MOUSEBUTTONDOWN:
+            if (!over_panel) handleClick(event.button);
+            break;
+        case SDL_MOUSEWHEEL:
+            if (!over_panel) zoomTo(event.wheel.y);
+            break;
+        case SDL_KEYDOWN:
+            if (!io.WantTextInput) handleKey(event.key.keysym.sym);
+            break;
+        case SDL_KEYUP:
+            light_key_ &= event.key.keysym.sym != SDLK_l;
+            break;
+        default:
+            break;
+    }
+}
+
+void Viewer::setPixels(double pixels) {
+    state_.pixels = std::clamp(pixels, 0.25, 64.0);
+    state_.message = fmt::format("tolerance {:.3g} px", state_.pixels);
+}
+
+void Viewer::handleKey(SDL_Keycode key) {
+    touch();
+    if (key >= SDLK_1 && key <= SDLK_8) state_.show = Show(key - SDLK_1);
+    switch (key) {
+        case SDLK_ESCAPE:
+            quit_ = true;
+            break;
+        case SDLK_f:
+            control_.frame(toolkit_.pictureSize());
+            break;
+        case SDLK_t:
+            control_.setStyle(control_.style() == CameraControl::Style::kTurntable
+                                  ? CameraControl::Style::kTrackball
+                                  : CameraControl::Style::kTurntable);
+            break;
+        case SDLK_LEFTBRACKET:
+            setPixels(state_.pixels / std::sqrt(2.0));
+            break;
+        case SDLK_RIGHTBRACKET:
+            setPixels(state_.pixels * std::sqrt(2.0));
+            break;
+        case SDLK_a:
+            state_.samples = 5 - state_.samples;
+            break;
+        case SDLK_l:
+            light_key_ = true;
+            break;
+        case SDLK_z:
+            state_.frozen = !state_.frozen;
+            break;
+        case SDLK_d:
+            state_.measuring = !state_.measuring;
+            state_.measured_count = 0;
+            break;
+        case SDLK_c:
+            toggleRecording();
+            break;
+        case SDLK_p:
+            savePicture();
+            break;
+        case SDLK_TAB:
+            state_.show_panel = !state_.show_panel;
+            break;
+        case SDLK_F1:
+            state_.show_help = !state_.show_help;
+            break;
+        default:
+            break;
+    }
+}
+
+void Viewer::handleDrag(const SDL_MouseMotionEvent& motion) {
+    const double dx = motion.x - cursor_x_, dy = motion.y - cursor_y_;
+    if (motion.state == 0 || (dx == 0 && dy == 0)) return;
+    const PictureSize size = settings_.size;
+    if (motion.state & SDL_BUTTON_LMASK) {
+        if (light_key_)
+            light_ = glm::normalize(light_ + Vec3d(dx, -dy, 0) * (2.0 / size.height));
+        else
+            control_.rotate(dx, dy, size);
+    } else if (motion.state & SDL_BUTTON_RMASK) {
+        control_.pan(dx, dy, size);
+    } else {
+        control_.look(dx, dy, size);
+    }
+    touch();
+}
+
+/// Window coordinates to pixels of the picture.
+Vec2d Viewer::pictureCursor() const {
+    int width = 1, height = 1;
+    SDL_GetWindowSize(toolkit_.window.get(), &width, &height);
+    const PictureSize size = toolkit_.pictureSize();
+    return {double(cursor_x_) * size.width / width, double(cursor_y_) * size.height / height};
+}
+
+/// The surface in the picture there, if any.
+std::optional<Vec3d> Viewer::pointAt(int x, int y) const {
+    if (!picture_ || x < 0 || y < 0 || x >= picture_->size.width || y >= picture_->size.height)
+        return {};
+    const float depth = picture_->depth[picture_->index(x, y)];
+    if (!std::isfinite(depth)) return {};
+    return control_.pointUnder(x + 0.5, y + 0.5, double(depth), picture_->size);
+}
+
+void Viewer::handleClick(const SDL_MouseButtonEvent& button) {
+    cursor_x_ = button.x;
+    cursor_y_ = button.y;
+    if (button.button != SDL_BUTTON_LEFT) return;
+    const Vec2d at = pictureCursor();
+    const std::optional<Vec3d> point = pointAt(int(at.x), int(at.y));
+    if (!point) return;
+    if (state_.measuring && button.clicks == 1) {
+        if (state_.measured_count == 2) state_.measured_count = 0;
+        state_.measured[size_t(state_.measured_count++)] = *point;
+    }
+    if (button.clicks == 2) {
+        control_.setPivot(*point);
+        state_.message = fmt::format("pivot {:.9g} {:.9g} {:.9g}", point->x, point->y, point->z);
+    }
+    touch();
+}
+
+void Viewer::zoomTo(int steps) {
+    const Vec2d at = pictureCursor();
+    const PictureSize size = toolkit_.pictureSize();
+    const std::optional<Vec3d> surface = pointAt(int(at.x), int(at.y));
+    control_.zoom(
+        std::pow(kZoomStep, steps),
+        surface ? *surface : control_.pointUnder(at.x, at.y, control_.pivotDepth(), size));
+    touch();
+}
+
+void Viewer::flyByKeys() {
+    if (ImGui::GetIO().WantTextInput) return;
+    const uint8_t* keys = SDL_GetKeyboardState(nullptr);
+    const auto axis = [&](SDL_Scancode plus, SDL_Scancode minus) {
+        return double(keys[plus]) - double(keys[minus]);
+    };
+    const double right = axis(SDL_SCANCODE_RIGHT, SDL_SCANCODE_LEFT);
+    const double forward = axis(SDL_SCANCODE_UP, SDL_SCANCODE_DOWN);
+    const double up = axis(SDL_SCANCODE_PAGEUP, SDL_SCANCODE_PAGEDOWN);
+    if (right == 0 && forward == 0 && up == 0) return;
+    const double time = std::clamp(last_frame_, 1.0 / 240, 0.2);
+    control_.fly(right * time, up * time, forward * time);
+    touch();
+}
+
+ShadeSettings Viewer::shade() const {
+    ShadeSettings shade;
+    shade.show = state_.show;
+    shade.light_direction = light_;
+    shade.value_min = 0;
+    shade.value_max = float(state_.pixels);
+    return shade;
+}
+
+/// In motion: coarser where frames take too long, finer again where there is time.
+void Viewer::adaptToMotion() {
+    if (!moving()) {
+        motion_factor_ = 1;
+        return;
+    }
+    const double ratio = 1e3 * last_frame_ / kFluentMs;
+    if (ratio > 1) motion_factor_ *= 1.15;
+    if (ratio < 0.7) motion_factor_ /= 1.1;
+    motion_factor_ = std::clamp(motion_factor_, 1.0, kMostCoarsened);
+}
+
+void Viewer::drawScene() {
+    adaptToMotion();
+    const PictureSize size = toolkit_.pictureSize();
+    if (!state_.frozen) frozen_camera_ = control_.camera();
+    FrameRequest request;
+    request.camera = frozen_camera_;
+    request.size = size;
+    request.pixels = state_.pixels * motion_factor_;
+    request.seconds = secondsSince(start_);
+    request.prefetch = state_.prefetch;
+    request.show_error = state_.show == Show::kError;
+    const Frame& frame = scene_.update(request);
+    const auto start = Clock::now();
+    const auto lattice = [&](size_t m) -> const Lattice& { return models_[m]->info().lattice; };
+    const View first(control_.camera(), size, lattice(0));
+    if (!rasteriser_ || rasteriser_samples_ != state_.samples)
+        rasteriser_.emplace(first, lattice(0), state_.samples, shade());
+    else
+        rasteriser_->restart(first, lattice(0), shade());
+    rasteriser_samples_ = state_.samples;
+    for (size_t m = 0; m < models_.size(); ++m) {
+        rasteriser_->setModel(View(control_.camera(), size, lattice(m)), lattice(m));
+        rasteriser_->draw(frame.models[m].patches);
+    }
+    picture_ = &rasteriser_->finish();
+    figures_.draw_ms = 1e3 * secondsSince(start);
+    figures_.tolerance_px = frame.tolerance_px;
+    figures_.converged = frame.converged && motion_factor_ == 1;
+    figures_.triangles = frame.triangles;
+    figures_.patches = frame.patch_count;
+    figures_.resident_bytes = frame.resident_bytes;
+    figures_.bytes_read = frame.bytes_read;
+    drawn_ = true;
+    if (texture_size_.width != size.width || texture_size_.height != size.height) {
+        texture_.reset(SDL_CreateTexture(toolkit_.renderer.get(), SDL_PIXELFORMAT_RGBA32,
+                                         SDL_TEXTUREACCESS_STREAMING, size.width, size.height));
+        texture_size_ = size;
+    }
+    SDL_UpdateTexture(texture_.get(), nullptr, picture_->colour.data(),
+                      size.width * int(sizeof(Rgba8)));
+}
+
+void Viewer::present() {
+    ImGui_ImplSDL2_NewFrame();
+    ImGui::NewFrame();
+    const ViewState before = state_;
+    drawPanel(state_, figures_, control_, scene_.faults());
+    if (before.pixels != state_.pixels || before.show != state_.show ||
+        before.samples != state_.samples || before.frozen != state_.frozen)
+        touch();
+    ImGui::Render();
+    SDL_RenderClear(toolkit_.renderer.get());
+    SDL_RenderCopy(toolkit_.renderer.get(), texture_.get(), nullptr, nullptr);
+    toolkit_.imgui->draw(*ImGui::GetDrawData());
+    SDL_RenderPresent(toolkit_.renderer.get());
+}
+
+void Viewer::savePicture() {
+    if (!picture_) return;
+    const std::string name = freeName("pietra", "png");
+    try {
+        writePng(*picture_, name, false);
+        state_.message = fmt::format("saved {}", name);
+    } catch (const std::exception& error) {
+        state_.message = error.what();
+    }
+}
+
+/// The window as it is seen, panels and all.
+void Viewer::saveWindow(const std::string& file) {
+    present();
+    Picture picture;
+    picture.size = toolkit_.pictureSize();
+    picture.colour.resize(picture.pixelCount());
+    SDL_RenderCopy(toolkit_.renderer.get(), texture_.get(), nullptr, nullptr);
+    toolkit_.imgui->draw(*ImGui::GetDrawData());
+    if (SDL_RenderReadPixels(toolkit_.renderer.get(), nullptr, SDL_PIXELFORMAT_RGBA32,
+                             picture.colour.data(), picture.size.width * int(sizeof(Rgba8))) != 0)
+        throw UsageError(fmt::format("the window cannot be read: {}", SDL_GetError()));
+    writePng(picture, file, true);
+}
+
+void Viewer::toggleRecording() {
+    state_.recording = !state_.recording;
+    if (state_.recording) {
+        path_ = {};
+        path_start_ = secondsSince(start_);
+        state_.message = "recording";
+        return;
+    }
+    if (path_.keys.empty()) return;
+    path_.seconds = std::max(path_.keys.back().t, kRecordSeconds);
+    const std::string name = freeName("path", "json");
+    std::ofstream out(name);
+    out << cameraPathText(path_);
+    state_.message =
+        out.flush() ? fmt::format("saved {}", name) : fmt::format("{} cannot be written", name);
+}
+
+void Viewer::record() {
+    if (!state_.recording || secondsSince(last_key_) < kRecordSeconds) return;
+    last_key_ = Clock::now();
+    path_.keys.push_back({secondsSince(start_) - path_start_, control_.camera()});
+}
+
+}  // namespace
+
+void runViewer(const std::vector<const ModelReader*>& models, const ViewerSettings& settings) {
+    Viewer(models, settings).run();
+}
+
+}  // namespace pietra
