@@ -1,37 +1,32 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "base/check.h"
 #include "render/gl/context.h"
 #include "render/gl/renderer.h"
 #include "render/offline/batch_drawer.h"
+#include "render/offline/gl_thread.h"
 
 namespace pietra {
 namespace {
 
-/// Makes the context current while it lives: whoever adds pages does so from many threads.
-class Current {
-public:
-    explicit Current(GlContext& context) : context_(context) { context_.makeCurrent(); }
-    ~Current() { context_.leave(); }
-
-private:
-    GlContext& context_;
-};
-
 class GlDrawer : public BatchDrawer {
 public:
-    GlDrawer(const View& view, const Lattice& lattice, const DrawerSettings& settings)
-        : context_(GlContext::headless()) {
-        renderer_.emplace(view.size(), settings.samples, settings.batch_bytes);
-        renderer_->begin(view, lattice, settings.shade);
+    GlDrawer(const View& view, const Lattice& lattice, const DrawerSettings& settings) {
         statistics_.device_bytes = settings.batch_bytes;
-        context_.leave();
+        thread_.run([&] {
+            context_.emplace(GlContext::headless());
+            renderer_.emplace(view.size(), settings.samples, settings.batch_bytes);
+            renderer_->begin(view, lattice, settings.shade);
+        });
     }
     ~GlDrawer() override {
-        const Current current(context_);
-        renderer_.reset();
+        thread_.run([&] {
+            renderer_.reset();
+            context_.reset();
+        });
     }
 
     void setModel(const View& view, const Lattice& lattice) override {
@@ -73,8 +68,7 @@ private:
     void timed(const Body& body) {
         using Clock = std::chrono::steady_clock;
         const auto start = Clock::now();
-        const Current current(context_);
-        body();
+        thread_.run(body);
         statistics_.draw_ms +=
             std::chrono::duration<double, std::milli>(Clock::now() - start).count();
     }
@@ -85,7 +79,8 @@ private:
         for (; first_page_ < pages_; ++first_page_) renderer_->release({0, first_page_});
     }
 
-    GlContext context_;
+    GlThread thread_;
+    std::optional<GlContext> context_;
     std::optional<GlRenderer> renderer_;
     std::vector<GlItem> items_;
     uint32_t first_page_ = 0, pages_ = 0;  // numbers of the pages there are
