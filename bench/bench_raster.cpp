@@ -1,22 +1,24 @@
 // Draws a million micro-triangles that fill 1280x1024, in patches of some 4000, with the CPU
-// rasteriser and, where there is EGL, with Mesa's llvmpipe, in turn in one process; prints the
-// median times and their ratio at 1 and 4 samples a pixel.
+// rasteriser and, where there is OpenGL 4.5, with GlRenderer, on whatever driver there is, in turn
+// in one process; prints the median times and their ratio at 1 and 4 samples a pixel.
 //
 //   bench_raster [ROUNDS] [TRIANGLES] [SAMPLES] [--alone]
 
+#include <epoxy/gl.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstring>
 #include <ctime>
 #include <deque>
+#include <optional>
 #include <vector>
 
+#include "base/error.h"
+#include "render/gl/context.h"
+#include "render/gl/renderer.h"
 #include "render/raster/rasteriser.h"
 #include "render/raster/test_meshes.h"
-#ifdef PIETRA_BENCH_LLVMPIPE
-#include "llvmpipe.h"
-#endif
 
 using namespace pietra;
 
@@ -101,7 +103,36 @@ void report(const char* name, const std::vector<Cost>& costs, size_t triangles) 
         name, wall, best_wall, double(triangles) / wall / 1e3, cpu, best_cpu);
 }
 
-void measure(const Scene& scene, int samples, int rounds, [[maybe_unused]] bool alone) {
+/// The same scene in graphics memory.
+class Rival {
+public:
+    Rival(const Scene& scene, const View& view, int samples)
+        : view_(view), renderer_(kSize, samples, size_t(256) << 20) {
+        for (uint32_t i = 0; i < scene.patches.size(); ++i) {
+            renderer_.upload({0, i}, {scene.patches[i].mesh, 1});
+            items_.push_back({{0, i}, 0, scene.patches[i].one_sided, i, {}, 0});
+        }
+    }
+    /// Waits until all is done; nothing is read back.
+    void draw() {
+        renderer_.begin(view_, Lattice{}, {});
+        renderer_.draw(items_);
+        renderer_.finish();
+        glFinish();
+    }
+    size_t pixelsCovered() {
+        size_t covered = 0;
+        for (const float depth : renderer_.readPicture().depth) covered += std::isfinite(depth);
+        return covered;
+    }
+
+private:
+    const View& view_;
+    GlRenderer renderer_;
+    std::vector<GlItem> items_;
+};
+
+void measure(const Scene& scene, int samples, int rounds, const GlContext* context) {
     const Lattice lattice;
     const View view(scene.camera, kSize, lattice);
     Rasteriser rasteriser(view, lattice, samples, {});
@@ -115,20 +146,16 @@ void measure(const Scene& scene, int samples, int rounds, [[maybe_unused]] bool 
     draw();
     fmt::print("{} sample(s), {} triangles, {} patches, {} pixels covered\n", samples,
                scene.triangles, scene.patches.size(), rasteriser.statistics().pixels_covered);
-#ifdef PIETRA_BENCH_LLVMPIPE
-    std::unique_ptr<Llvmpipe> rival;
-    if (!alone) {
-        rival = std::make_unique<Llvmpipe>(view, scene.patches, samples);
+    std::optional<Rival> rival;
+    if (context != nullptr) {
+        rival.emplace(scene, view, samples);
         rival->draw();
-        fmt::print("  rival: {}, {} pixels covered\n", rival->renderer(), rival->pixelsCovered());
+        fmt::print("  rival: {}, {} pixels covered\n", context->renderer(), rival->pixelsCovered());
     }
-#endif
     for (int i = 0; i < rounds; ++i) {
         ours.push_back(costOf(draw));
         stages.push_back(rasteriser.statistics());
-#ifdef PIETRA_BENCH_LLVMPIPE
         if (rival) theirs.push_back(costOf([&] { rival->draw(); }));
-#endif
     }
     report("pietra", ours, scene.triangles);
     const auto stage = [&](double RasterStatistics::*member) { return medianOf(stages, member); };
@@ -136,7 +163,7 @@ void measure(const Scene& scene, int samples, int rounds, [[maybe_unused]] bool 
                stage(&RasterStatistics::transform_ms), stage(&RasterStatistics::raster_ms),
                stage(&RasterStatistics::shade_ms), stage(&RasterStatistics::finish_ms));
     if (theirs.empty()) return;
-    report("llvmpipe", theirs, scene.triangles);
+    report("opengl", theirs, scene.triangles);
     fmt::print("  ratio of medians: wall {:.2f}, cpu {:.2f}\n",
                medianOf(theirs, &Cost::wall_ms) / medianOf(ours, &Cost::wall_ms),
                medianOf(theirs, &Cost::cpu_ms) / medianOf(ours, &Cost::cpu_ms));
@@ -154,7 +181,13 @@ int main(int argc, char** argv) {
             numbers.push_back(std::strtol(argv[i], nullptr, 10));
     const int rounds = numbers.empty() ? 15 : int(numbers[0]);
     const Scene scene = makeScene(numbers.size() > 1 ? size_t(numbers[1]) : 1000000);
+    std::optional<GlContext> context;
+    try {
+        if (!alone) context.emplace(GlContext::headless());
+    } catch (const UsageError& error) {
+        fmt::print("{}\n", error.what());
+    }
     for (const int samples : {1, 4})
         if (numbers.size() <= 2 || numbers[2] == samples)
-            measure(scene, samples, std::max(rounds, 1), alone);
+            measure(scene, samples, std::max(rounds, 1), context ? &*context : nullptr);
 }

@@ -8,10 +8,10 @@
 set -euo pipefail
 
 declare -A packages=(
-    [build]="g++ cmake ninja-build pkg-config python3 libcli11-dev libfmt-dev libglm-dev
-             libgtest-dev libhwy-dev libimgui-dev liblzma-dev libmeshoptimizer-dev libpng-dev
-             libsdl2-dev libspdlog-dev libtbb-dev libxxhash-dev libzstd-dev nlohmann-json3-dev
-             zlib1g-dev"
+    [build]="g++ cmake ninja-build pkg-config python3 libcli11-dev libegl-dev libegl-mesa0 libegl1
+             libepoxy-dev libfmt-dev libgl1-mesa-dri libglm-dev libgtest-dev libhwy-dev
+             libimgui-dev liblzma-dev libmeshoptimizer-dev libpng-dev libsdl2-dev libspdlog-dev
+             libtbb-dev libxxhash-dev libzstd-dev nlohmann-json3-dev zlib1g-dev"
     [ci]="ccache clang-14 libclang-rt-14-dev"
     [demo]="ferret-datasets"
 )

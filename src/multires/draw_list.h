@@ -8,6 +8,13 @@
 
 namespace pietra {
 
+/// A page of one of the models in a scene: by what loaders and renderers that keep pages tell them.
+struct PageKey {
+    uint32_t model = 0;
+    uint32_t page = 0;
+    bool operator==(const PageKey&) const = default;
+};
+
 /// One mesh of a frame's draw list. Plain data; the mesh is not owned.
 struct DrawPatch {
     /// Never null; must stay as it is until the renderer's draw() has returned. Every vertex has a

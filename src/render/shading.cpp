@@ -129,24 +129,27 @@ Vec3f hashColour(uint64_t identity) {
     return fromHue(hue, saturation, value);
 }
 
-Vec3f patchColour(const ShadeSettings& settings, const DrawPatch& patch) {
+Vec3f patchColour(const ShadeSettings& settings, uint32_t id, const Rgba8& tint, float value,
+                  bool coloured) {
     switch (settings.show) {
         case Show::kLod:
-            return levelColour(patch.value);
+            return levelColour(value);
         case Show::kPatches:
-            return hashColour(patch.id);
+            return hashColour(id);
         case Show::kError: {
             const float range = settings.value_max - settings.value_min;
-            return heatColour(range > 0 ? (patch.value - settings.value_min) / range : 0);
+            return heatColour(range > 0 ? (value - settings.value_min) / range : 0);
         }
-        case Show::kShaded: {
-            const bool coloured = !patch.mesh->colour.empty();
-            return linearFromSrgb(patch.tint) *
+        case Show::kShaded:
+            return linearFromSrgb(tint) *
                    (coloured ? Vec3f(1, 1, 1) : linearFromSrgb(settings.surface));
-        }
         default:
             return linearFromSrgb(settings.surface);
     }
+}
+
+Vec3f patchColour(const ShadeSettings& settings, const DrawPatch& patch) {
+    return patchColour(settings, patch.id, patch.tint, patch.value, !patch.mesh->colour.empty());
 }
 
 std::array<Rgba8, 4> backgroundRow(const ShadeSettings& settings, int y, int height) {

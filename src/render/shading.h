@@ -46,6 +46,14 @@ struct ShadeSettings {
     Rgba8 background_bottom{24, 26, 31, 255};
 };
 
+/// The light of all lit views: warm from the one side, cool from the sky, some from the ground and
+/// from the eye, for a surface that reads well from every direction. Shine is the 32nd power.
+inline constexpr float kKeyLight[3] = {0.86f, 0.81f, 0.73f};
+inline constexpr float kSkyLight[3] = {0.13f, 0.16f, 0.20f};
+inline constexpr float kGroundLight[3] = {0.055f, 0.045f, 0.04f};
+inline constexpr float kEyeLight = 0.07f;
+inline constexpr float kShine = 0.12f;
+
 /// Linear light of an sRGB value in [0, 1], which is clamped, or of a byte; the byte nearest to a
 /// linear value, within a fifth of a step: srgbFromLinear(linearFromSrgb(byte)) == byte.
 float linearFromSrgb(float srgb);
@@ -72,6 +80,9 @@ Vec3f hashColour(uint64_t identity);  ///< a light colour that looks random
 /// The colour in linear light that a patch as a whole has in a view; what a view takes from the
 /// vertices or from the triangle instead multiplies it (Show::kShaded) or replaces it.
 Vec3f patchColour(const ShadeSettings& settings, const DrawPatch& patch);
+/// The same without the mesh; `coloured`: it has vertex colours.
+Vec3f patchColour(const ShadeSettings& settings, uint32_t id, const Rgba8& tint, float value,
+                  bool coloured);
 /// One row of the background, in sRGB: pixel x has colour [x % 4]. Dithered, as the steps of so
 /// gentle a gradient would be seen.
 std::array<Rgba8, 4> backgroundRow(const ShadeSettings& settings, int y, int height);

@@ -14,16 +14,10 @@
 #include <vector>
 
 #include "geometry/mesh.h"
+#include "multires/draw_list.h"
 #include "store/model_reader.h"
 
 namespace pietra {
-
-/// A page of one of the models in a scene.
-struct PageKey {
-    uint32_t model = 0;
-    uint32_t page = 0;
-    bool operator==(const PageKey&) const = default;
-};
 
 struct LoadedPage {
     PageKey key;

@@ -252,12 +252,27 @@ class Shown(VerbTest):
             pictures.add(self.read(f"{show}.png"))
         self.assertEqual(len(pictures), 9)
 
+    def test_opengl_draws_the_same(self):
+        run = self.run_pietra("render", "statue.pietra", "-o", "gl.png", "--size", "200x160",
+                              "--renderer", "gl")
+        if "there is no OpenGL 4.5" in run.stderr:
+            self.skipTest(run.stderr)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        for samples in ("1", "4"):
+            self.render("cpu.png", "--samples", samples)
+            shown = self.render("gl.png", "--samples", samples, "--renderer", "gl", "--force")
+            self.assertGreater(shown["resident_bytes"]["vram"], 0)
+            self.report("compare", "cpu.png", "gl.png", "--json", "--max-px", "1", "--max-shade", "2")
+            os.remove(os.path.join(self.folder, "cpu.png"))
+
     def test_render_refusals(self):
         end = " (see pietra render --help)"
         refuse = self.assertRefused
         start = ["render", "statue.pietra", "-o", "x.png"]
+        os.environ["__EGL_VENDOR_LIBRARY_FILENAMES"] = os.devnull  # no driver is found
         refuse(start + ["--renderer", "gl"], 2,
-               "--renderer gl: the OpenGL renderer is not there yet; use cpu")
+               "--renderer gl: there is no OpenGL 4.5: no EGL device offers it")
+        del os.environ["__EGL_VENDOR_LIBRARY_FILENAMES"]
         refuse(start + ["--light", "1,2"], 2, "render: --light: '1,2' is not of the form X,Y,Z" + end)
         refuse(start + ["--light", "0,0,0"], 2, "render: --light: '0,0,0' is no direction" + end)
         refuse(start + ["--camera", "c.json", "--view", "top"], 2,

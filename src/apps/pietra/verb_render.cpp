@@ -70,11 +70,10 @@ VerbText RenderVerb::text() const {
             "draw a picture of one or more models",
             {"FILE... -o OUT.png [options]"},
             {"Draws the models as finely as the tolerance asks for: no point of the picture is "
-             "moved by "
-             "more than --pixels from where the full mesh would put it. --pixels 0 draws the full "
-             "mesh, "
-             "streamed: memory stays within --ram, however large the models are. No display and no "
-             "graphics driver is needed.",
+             "moved by more than --pixels from where the full mesh would put it. --pixels 0 draws "
+             "the full mesh, streamed: memory stays within --ram, however large the models are. No "
+             "display is needed, "
+             "and no graphics driver but for --renderer gl.",
              "The picture is a PNG, with the depth of every pixel in a private chunk that other "
              "programs skip and `pietra compare` reads.",
              "Several models are drawn together, each in its own coordinates."},
@@ -182,6 +181,7 @@ OfflineSettings RenderVerb::settings(const ModelFiles& files) const {
     OfflineSettings settings;
     settings.pixels = pixels_;
     settings.culling = culling();
+    settings.renderer = renderer_ == "gl" ? DrawWith::kGl : DrawWith::kCpu;
     settings.samples = samples_ == "4" ? 4 : 1;
     settings.memory_bytes = size_t(ram_);
     settings.jobs = Limits{{}, jobs_}.threads();
@@ -206,23 +206,24 @@ Json RenderVerb::report(const OfflineStatistics& s, size_t resident_bytes) const
               {"decode", s.decode_ms},
               {"draw", s.draw_ms},
               {"total", s.total_ms}}},
-            {"resident_bytes", {{"ram", resident_bytes}, {"vram", 0}}},
+            {"resident_bytes", {{"ram", resident_bytes}, {"vram", s.device_bytes}}},
             {"tolerance_px", pixels_}};
 }
 
 OfflinePicture RenderVerb::draw(const ModelFiles& files, const Camera& camera,
                                 Progress& progress) const {
+    const OfflineSettings offline = settings(files);
     try {
-        return drawModels(files.views(), camera, size_, settings(files), progress);
+        return drawModels(files.views(), camera, size_, offline, progress);
     } catch (const MemoryError& error) {
         throw MemoryError(fmt::format("--ram {}: {}", formatBytes(ram_), error.what()));
+    } catch (const UsageError& error) {
+        throw UsageError(fmt::format("--renderer {}: {}", renderer_, error.what()));
     }
 }
 
 int RenderVerb::run(const RunContext& context) {
     const size_t resident_before = residentBytes();
-    if (renderer_ == "gl")
-        throw UsageError("--renderer gl: the OpenGL renderer is not there yet; use cpu");
     const ThreadLimit threads(Limits{{}, jobs_}.threads());
     if (!output_.ends_with(".png")) throw UsageError(fmt::format("{}: is not named .png", output_));
     checkOutput(output_, context.common.force);

@@ -10,7 +10,7 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "base/text.h"
-#include "render/raster/rasteriser.h"
+#include "render/offline/batch_drawer.h"
 #include "runtime/eye_side.h"
 #include "runtime/patch_reader.h"
 
@@ -21,11 +21,10 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 /// Larger batches draw no faster.
-constexpr size_t kLargestBatch = size_t(256) << 20;
-/// What the rasteriser keeps of a vertex and of a pixel (rasteriser.h), and a pixel of the picture
-/// that is handed out.
-constexpr size_t kScreenVertexBytes = 16;
-constexpr size_t kPixelBytes = 17, kPixelBytesOfFour = 49;
+constexpr size_t kLargestBatch = size_t(256) << 20, kLargestGlBatch = size_t(64) << 20;
+/// What the renderers keep of a pixel with one sample and with four (rasteriser.h, gl/renderer.h),
+/// and a pixel of the picture that is handed out.
+constexpr size_t kRasterPixelBytes[2] = {17, 49}, kGlPixelBytes[2] = {16, 40};
 constexpr size_t kPictureBytes = sizeof(Rgba8) + sizeof(float);
 /// Threads with their stacks and heaps, and what else nobody counts.
 constexpr size_t kUncountedBytes = size_t(3) << 20;
@@ -45,14 +44,6 @@ struct SceneModel {
         return view.errorInPixels(node(i).error, node(i).saturated);
     }
 };
-
-/// Of a mesh while it is drawn.
-size_t drawnBytes(const Mesh& mesh) {
-    const auto bytes = [](const auto& array) { return array.size() * sizeof(array[0]); };
-    return bytes(mesh.position) + bytes(mesh.triangle) + bytes(mesh.edge_class) +
-           bytes(mesh.normal) + bytes(mesh.colour) + bytes(mesh.scalar) +
-           mesh.vertexCount() * kScreenVertexBytes;
-}
 
 class OfflineRenderer {
 public:
@@ -77,12 +68,13 @@ public:
         result_.statistics.select_ms = msSince(start);
         planMemory();
         progress_.beginStage("draw", patches);
-        Rasteriser rasteriser(models_[0].view, models_[0].reader->info().lattice, settings_.samples,
-                              settings_.shade);
-        for (uint32_t m = 0; m < models_.size(); ++m) drawModel(m, rasteriser);
-        result_.picture = rasteriser.finish();
+        const auto make = onGpu() ? makeGlDrawer : makeRasterDrawer;
+        const auto drawer = make(models_[0].view, models_[0].reader->info().lattice,
+                                 {settings_.samples, settings_.shade, batch_bytes_});
+        for (uint32_t m = 0; m < models_.size(); ++m) drawModel(m, *drawer);
+        result_.picture = drawer->finish();
         progress_.endStage();
-        report(rasteriser.statistics());
+        report(drawer->statistics());
         result_.statistics.total_ms = msSince(start);
         return std::move(result_);
     }
@@ -117,50 +109,38 @@ private:
             tables += model.reader->nodes().size() * sizeof(Node) +
                       model.reader->pageCount() * sizeof(PageInfo);
         }
-        const size_t pixel = settings_.samples == 4 ? kPixelBytesOfFour : kPixelBytes;
+        const size_t pixel = (onGpu() ? kGlPixelBytes : kRasterPixelBytes)[settings_.samples == 4];
         fixed_bytes_ = tables +
                        size_t(size_.width) * size_t(size_.height) * (pixel + kPictureBytes) +
                        (in_flight() + size_t(settings_.jobs)) * page + kUncountedBytes;
         // Each thread's decoder has scratch of a page's size. The page that fills a batch may
-        // exceed it; with screen vertices it is twice as large.
-        const size_t least = fixed_bytes_ + 2 * page;
+        // exceed it; with screen vertices it is twice as large. Graphics memory must hold a page.
+        const size_t batch = onGpu() ? leastGlBatchBytes(page) : 2 * page;
+        const size_t least = fixed_bytes_ + batch;
         if (least > settings_.memory_bytes)
             throw MemoryError(fmt::format("drawing this needs {} at least", formatBytes(least)));
-        batch_bytes_ = std::min(settings_.memory_bytes - least, kLargestBatch);
+        const size_t spare = settings_.memory_bytes - least;
+        batch_bytes_ = onGpu() ? std::min(batch + spare, std::max(batch, kLargestGlBatch))
+                               : std::min(spare, kLargestBatch);
         result_.statistics.resident_bytes = fixed_bytes_;
     }
 
+    bool onGpu() const { return settings_.renderer == DrawWith::kGl; }
     size_t in_flight() const { return size_t(settings_.jobs) + 1; }
 
-    void drawModel(uint32_t m, Rasteriser& rasteriser) {
+    void drawModel(uint32_t m, BatchDrawer& drawer) {
         const SceneModel& model = models_[m];
-        rasteriser.setModel(model.view, model.reader->info().lattice);
-        std::vector<DecodedRun> batch;
-        size_t bytes = 0;
+        drawer.setModel(model.view, model.reader->info().lattice);
         const ReadTimes times =
             visitInOrder(*model.reader, model.cut.nodes, in_flight(), [&](DecodedRun& run) {
-                for (const Mesh& mesh : run.patches) bytes += drawnBytes(mesh);
-                batch.push_back(std::move(run));
-                if (bytes < batch_bytes_) return;
-                drawBatch(m, batch, bytes, rasteriser);
-                batch.clear();
-                bytes = 0;
+                std::vector<DrawPatch> list;
+                for (size_t i = 0; i < run.nodes.size(); ++i)
+                    list.push_back(describe(m, run.nodes[i], run.patches[i]));
+                drawer.add(std::move(run.patches), std::move(list));
+                progress_.tick(run.nodes.size());
             });
-        drawBatch(m, batch, bytes, rasteriser);
         result_.statistics.load_ms += times.load_ms;
         result_.statistics.decode_ms += times.decode_ms;
-    }
-
-    void drawBatch(uint32_t m, const std::vector<DecodedRun>& batch, size_t bytes,
-                   Rasteriser& rasteriser) {
-        std::vector<DrawPatch> list;
-        for (const DecodedRun& run : batch)
-            for (size_t i = 0; i < run.nodes.size(); ++i)
-                list.push_back(describe(m, run.nodes[i], run.patches[i]));
-        rasteriser.draw(list);
-        result_.statistics.resident_bytes =
-            std::max(result_.statistics.resident_bytes, fixed_bytes_ + bytes);
-        progress_.tick(list.size());
     }
 
     DrawPatch describe(uint32_t m, NodeIndex index, const Mesh& mesh) const {
@@ -174,11 +154,14 @@ private:
         return patch;
     }
 
-    void report(const RasterStatistics& raster) {
-        result_.statistics.patches = raster.patches;
-        result_.statistics.triangles = raster.triangles;
-        result_.statistics.pixels_covered = raster.pixels_covered;
-        result_.statistics.draw_ms = raster.totalMs();
+    void report(const DrawerStatistics& drawn) {
+        OfflineStatistics& statistics = result_.statistics;
+        statistics.patches = drawn.patches;
+        statistics.triangles = drawn.triangles;
+        statistics.pixels_covered = drawn.pixels_covered;
+        statistics.draw_ms = drawn.draw_ms;
+        statistics.device_bytes = drawn.device_bytes;
+        statistics.resident_bytes += std::max(drawn.held_bytes, drawn.device_bytes);
     }
 
     OfflineSettings settings_;

@@ -143,5 +143,58 @@ TEST_F(OfflineTest, SaysHowMuchMemoryItNeeds) {
     }
 }
 
+bool glIsThere(const Terrain& terrain, OfflineSettings settings, std::string& why) {
+    settings.renderer = DrawWith::kGl;
+    try {
+        terrain.draw(settings);
+        return true;
+    } catch (const UsageError& error) {
+        why = error.what();
+        return false;
+    }
+}
+
+/// Pixels that differ in coverage, or by more than 2 of 255, or in depth by a thousandth.
+size_t differences(const Picture& a, const Picture& b) {
+    size_t count = 0;
+    for (size_t i = 0; i < a.pixelCount(); ++i) {
+        const Rgba8 &c = a.colour[i], &d = b.colour[i];
+        const bool there = std::isfinite(a.depth[i]);
+        count += there != std::isfinite(b.depth[i]) || std::abs(c.r - d.r) > 2 ||
+                 std::abs(c.g - d.g) > 2 || std::abs(c.b - d.b) > 2 ||
+                 (there && std::abs(a.depth[i] - b.depth[i]) > 1e-3f * a.depth[i]);
+    }
+    return count;
+}
+
+TEST_F(OfflineTest, OpenGlDrawsTheSameInAnyMemory) {
+    const Terrain terrain(writeTerrain("a", {0, 0, 0})), other(writeTerrain("b", {0, 0, -3}));
+    OfflineSettings settings;
+    std::string why;
+    if (!glIsThere(terrain, settings, why)) GTEST_SKIP() << why;
+    settings.pixels = 0;
+    for (settings.samples = 1; settings.samples <= 4; settings.samples += 3) {
+        settings.renderer = DrawWith::kCpu;
+        const OfflinePicture cpu = terrain.draw(settings, {&other.reader, &terrain.reader});
+        settings.renderer = DrawWith::kGl;
+        const OfflinePicture gpu = terrain.draw(settings, {&other.reader, &terrain.reader});
+        EXPECT_LE(differences(cpu.picture, gpu.picture), cpu.picture.pixelCount() / 200);
+        EXPECT_EQ(gpu.statistics.triangles, cpu.statistics.triangles);
+        EXPECT_EQ(gpu.statistics.patches, cpu.statistics.patches);
+        EXPECT_NEAR(double(gpu.statistics.pixels_covered), double(cpu.statistics.pixels_covered),
+                    1e-4 * double(cpu.picture.pixelCount()));
+        const Picture alone = terrain.draw(settings).picture;
+        const OfflineSettings tight = smallest(settings, terrain);
+        for (const int jobs : {1, 3}) {
+            const ThreadLimit threads(jobs);
+            const OfflinePicture again = terrain.draw(tight);
+            EXPECT_EQ(again.picture.colour, alone.colour);
+            EXPECT_EQ(again.picture.depth, alone.depth);
+            EXPECT_LE(again.statistics.resident_bytes, tight.memory_bytes);
+            EXPECT_GT(again.statistics.device_bytes, 0u);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace pietra

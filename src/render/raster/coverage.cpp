@@ -38,11 +38,11 @@ void narrow(int64_t value, int64_t per_pixel, int64_t& first, int64_t& last) {
 }
 
 struct Depths {
-    float d0, d1, d2, nearest, farthest;
+    float d0, d1, d2, nearest, farthest;  // of the corners; the range
     explicit Depths(const std::array<ScreenPoint, 3>& c)
         : d0(c[0].inv_depth),
-          d1(c[1].inv_depth - c[0].inv_depth),
-          d2(c[2].inv_depth - c[0].inv_depth),
+          d1(c[1].inv_depth),
+          d2(c[2].inv_depth),
           nearest(std::max({c[0].inv_depth, c[1].inv_depth, c[2].inv_depth})),
           farthest(std::min({c[0].inv_depth, c[1].inv_depth, c[2].inv_depth})) {}
     /// Rounding must not carry a depth out of the triangle's range, or below zero.
@@ -62,10 +62,12 @@ struct Span {
 template <class Real>
 void fillSpan(const Span& span, const Depths& depths, Real inv_area, uint32_t low) {
     int64_t e1 = span.e1, e2 = span.e2;
+    // note: differences in float would lose what is far away of a triangle with a corner at the eye.
+    const Real d0 = depths.d0, d1 = Real(depths.d1) - d0, d2 = Real(depths.d2) - d0;
     VisibilityKey* key = span.key;
     for (int64_t i = 0; i < span.count; ++i, key += span.stride) {
-        const Real sum = Real(e1) * Real(depths.d1) + Real(e2) * Real(depths.d2);
-        const uint32_t bits = depths.bits(float(Real(depths.d0) + sum * inv_area));
+        const Real sum = Real(e1) * d1 + Real(e2) * d2;
+        const uint32_t bits = depths.bits(float(d0 + sum * inv_area));
         *key = std::max(*key, VisibilityKey(bits) << 32 | low);
         e1 += span.step1;
         e2 += span.step2;

@@ -29,7 +29,7 @@ void PixelShader::giveWeights(const BatchPatch& patch, const ShadeItem& item, si
                     (view_.centre_y - double(item.y()) - 0.5) * view_.inv_focal, 1);
     lanes.any_given = true;
     lanes.given[lane] = -1;
-    lanes.given_back[lane] = glm::dot(v[0], glm::cross(v[1], v[2])) > 0 ? -1 : 0;
+    lanes.given_back[lane] = glm::dot(v[0], glm::cross(v[1], v[2])) < 0 ? -1 : 0;
     double weight[3], sum = 0;
     for (int k = 0; k < 3; ++k) {
         weight[k] = glm::dot(ray, glm::cross(v[(k + 1) % 3], v[(k + 2) % 3]));

@@ -482,5 +482,34 @@ TEST(Picture, StatisticsCountWhatWasDrawn) {
     EXPECT_GT(rasteriser.statistics().totalMs(), 0);
 }
 
+/// A plane that goes on behind the eye, from above or from below.
+TEST(Picture, ATriangleAtTheEyeIsTrueFarAwayAndLitFromItsOwnSide) {
+    const Mesh ground = grid(
+        1, 1, [](double u, double v) { return Vec3d(12000 * u - 6000, 9000 * v - 6000, 100); });
+    for (const double height : {900.0, 80.0}) {
+        const Camera camera{{0, 0, height}, {0, 1000, height}, {0, 0, 1}, 60};
+        const View view(camera, {161, 123}, Lattice{});
+        const Picture picture = render(view, ground);
+        ShadeSettings normals;
+        normals.show = Show::kNormals;
+        const DrawPatch patch{&ground, false, 0, {}, 0};
+        const Picture facing = render(view, {&patch, 1}, 1, normals);
+        size_t seen = 0;
+        for (int y = 0; y < 123; ++y)
+            for (int x = 0; x < 161; ++x) {
+                const size_t i = picture.index(x, y);
+                if (picture.depth[i] == kNothing) continue;
+                const double down = (y + 0.5 - 61.5) / view.focal_px();
+                const double depth = (height - 100) / down;
+                // What moving the horizon by 1/256 pixel would do.
+                ASSERT_NEAR(picture.depth[i], depth, depth / (256 * std::abs(y + 0.5 - 61.5)))
+                    << x << " " << y;
+                ASSERT_EQ(facing.colour[i].g > 127, height > 100) << x << " " << y;
+                ++seen;
+            }
+        EXPECT_GT(seen, 5000u);
+    }
+}
+
 }  // namespace
 }  // namespace pietra

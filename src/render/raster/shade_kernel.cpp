@@ -185,14 +185,6 @@ void InterpolateLanes(const ShadeView& view, ShadeLanes& lanes) {
         Interpolator(view, lanes, at).run();
 }
 
-// A mix of warm light from one side, cool light from the sky and some from the ground and the eye,
-// for a surface that reads well from every direction.
-constexpr float kKeyLight[3] = {0.86f, 0.81f, 0.73f};
-constexpr float kSkyLight[3] = {0.13f, 0.16f, 0.20f};
-constexpr float kGroundLight[3] = {0.055f, 0.045f, 0.04f};
-constexpr float kEyeLight = 0.07f;
-constexpr float kShine = 0.12f;
-
 HWY_INLINE VI tableIndex(VF linear) {
     const VF clamped = hn::Min(positive(linear), set(1));
     return hn::NearestInt(hn::Mul(clamped, set(float(kSrgbEntries - 1))));

@@ -1,0 +1,60 @@
+#include "render/gl/program.h"
+
+#include <fmt/format.h>
+
+#include <string>
+
+#include "base/check.h"
+#include "render/gl/shader_text.h"
+
+namespace pietra {
+namespace {
+
+constexpr std::string_view kHead =
+    "#version 450 core\n"
+    "#extension GL_ARB_shader_draw_parameters : require\n";
+
+GlShader compile(const GlStage& stage, std::string_view defines) {
+    std::string source = fmt::format("{}{}", kHead, defines);
+    std::string names;
+    for (const std::string_view file : stage.files) {
+        const std::string_view text = embeddedText(file);
+        CHECK(!text.empty());
+        source += fmt::format("#line 1\n{}", text);
+        names += fmt::format(" {}", file);
+    }
+    GlShader shader(glCreateShader(stage.kind));
+    const char* begin = source.c_str();
+    glShaderSource(shader, 1, &begin, nullptr);
+    glCompileShader(shader);
+    GLint done = 0;
+    glGetShaderiv(shader, GL_COMPILE_STATUS, &done);
+    if (done == 0) {
+        std::string log(4096, '\0');
+        GLsizei length = 0;
+        glGetShaderInfoLog(shader, GLsizei(log.size()), &length, log.data());
+        log.resize(size_t(length));
+        failCheck(__FILE__, __LINE__, fmt::format("shader{} does not compile: {}", names, log));
+    }
+    return shader;
+}
+
+}  // namespace
+
+GlProgram makeProgram(std::initializer_list<GlStage> stages, std::string_view defines) {
+    GlProgram program(glCreateProgram());
+    for (const GlStage& stage : stages) glAttachShader(program, compile(stage, defines));
+    glLinkProgram(program);
+    GLint done = 0;
+    glGetProgramiv(program, GL_LINK_STATUS, &done);
+    if (done == 0) {
+        std::string log(4096, '\0');
+        GLsizei length = 0;
+        glGetProgramInfoLog(program, GLsizei(log.size()), &length, log.data());
+        log.resize(size_t(length));
+        failCheck(__FILE__, __LINE__, fmt::format("shaders do not link: {}", log));
+    }
+    return program;
+}
+
+}  // namespace pietra

@@ -1,0 +1,107 @@
+#pragma once
+// Renderer on the GPU, by OpenGL 4.5: page meshes in one buffer of fixed size, drawn by few calls
+// of multi-draw-indirect, whatever their number. Its pictures are the CPU renderer's
+// (raster/rasteriser.h), but for what a driver's arithmetic moves: the same images of vertices,
+// rounded to 1/256 pixel, the same fill rule, near distance, depth, light and debug views.
+//
+// Depth is reversed, the far plane at infinity, in float: there is no near or far plane to choose,
+// and triangles are cut where they come within kNearDepth lattice units of the eye. Of equal depths
+// the one drawn first wins, within a draw() in no particular order.
+//
+// A picture: begin(), then uploads, draws and releases in any order, then readPicture() or
+// present(). Memory for pages is `vram_bytes`, an eighth of it the ring for uploads; targets come
+// on top: 8 bytes a sample and 8 a pixel. All memory is taken and all shaders are compiled when a
+// renderer is made; a frame does neither, nor does it wait, as long as it uploads no more than
+// uploadRoom().
+//
+// The context must be current whenever anything here is called, also on destruction. Other state of
+// the context than what is bound does not matter, and clip control, culling and tests are left as
+// OpenGL has them at first.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "geometry/lattice.h"
+#include "multires/view.h"
+#include "render/gl/page_store.h"
+#include "render/picture.h"
+#include "render/shading.h"
+
+namespace pietra {
+
+/// A patch to draw. Plain data.
+struct GlItem {
+    PageKey key;         ///< of a page that is uploaded
+    uint32_t patch = 0;  ///< of those of the page
+    // As in DrawPatch.
+    bool one_sided = false;
+    uint32_t id = 0;
+    Rgba8 tint{};
+    float value = 0;
+};
+
+struct GlStatistics {
+    uint64_t triangles = 0;     ///< drawn since begin()
+    uint64_t patches = 0;       ///< with triangles, likewise
+    uint64_t upload_bytes = 0;  ///< likewise
+    /// Of the last picture whose time is known, from begin() to its end; 0 before there is one.
+    double gpu_ms = 0;
+};
+
+/// Least memory for pages.
+inline constexpr size_t kLeastVramBytes = size_t(1) << 19;
+
+class GlRenderer {
+public:
+    /// `samples`: 1 at the pixel's centre, or 4 where the driver has them, shaded once a pixel and
+    /// triangle. At least kLeastVramBytes of memory; of more than 8 GiB the rest is not used. What
+    /// the driver does not have shows as MemoryError.
+    GlRenderer(const PictureSize& size, int samples, size_t vram_bytes);
+    ~GlRenderer();
+    GlRenderer(const GlRenderer&) = delete;
+    GlRenderer& operator=(const GlRenderer&) = delete;
+
+    /// Copies a page's patches; `key` must not be in use. All those with vertices must have the
+    /// same attributes, normals among them, and extents below 2^21 lattice units. False where there
+    /// is no room for the page, and nothing has changed.
+    bool upload(PageKey key, std::span<const Mesh> patches);
+    /// Makes room; what was drawn of the page stays in the picture. The key may be used again.
+    void release(PageKey key);
+    bool holds(PageKey key) const;
+    /// Bytes that can be uploaded now without waiting for the GPU.
+    size_t uploadRoom();
+    /// What pages take now, and what there is for them.
+    size_t usedBytes() const;
+    size_t capacityBytes() const;
+
+    /// Another picture of this size from the next begin() on.
+    void resize(const PictureSize& size);
+    /// Begins a picture; `view` must have been made with `lattice` and be of the picture's size.
+    void begin(const View& view, const Lattice& lattice, const ShadeSettings& settings);
+    /// What is drawn from now on lies on another lattice (another model of the same scene); `view`
+    /// is the same camera in its coordinates.
+    void setModel(const View& view, const Lattice& lattice);
+    void draw(std::span<const GlItem> items);
+    /// Draws the same, but leaves out on the GPU what is hidden (occlusion.h), by what is drawn
+    /// already or by each other: for the frames of a flight, where most that is seen was seen
+    /// before. No pixel changes but where surfaces coincide.
+    void drawUnhidden(std::span<const GlItem> items);
+    /// Of the patches that it drew last at a time, a call's if they are few, how many were not left
+    /// out. Waits for the GPU: not for frames.
+    size_t countUnhidden() const;
+    /// Completes the picture, without waiting for it. Nothing can be drawn before the next begin().
+    void finish();
+    /// Completes the picture and waits for it.
+    Picture readPicture();
+    /// Completes the picture and copies it to the window's lower left corner.
+    void present();
+
+    const GlStatistics& statistics() const;
+
+private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace pietra

@@ -1,0 +1,11 @@
+// What the shaders of occlusion culling share: CullRecord and what is around it, see occlusion.h.
+struct CullRecord {
+    ivec3 corner;
+    uint slot;
+    ivec3 extent;
+    uint always;
+};
+layout(std430, binding = 1) readonly buffer CullRecords { CullRecord records[]; };
+// In sight in the picture before, and in this one so far.
+layout(std430, binding = 5) buffer Last { uint last[]; };
+layout(std430, binding = 6) buffer Now { uint now[]; };
