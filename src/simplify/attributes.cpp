@@ -76,7 +76,7 @@ void VertexAttributes::setRanges(std::span<const float> scalar_range, float span
 }
 
 void VertexAttributes::loadValues(uint32_t v) {
-    float* value = &value_[size_t(v) * stride_];
+    float* value = value_.data() + size_t(v) * stride_;
     if (colour_count_ != 0) {
         value[0] = float(colour_[v].r) * scale_[0];
         value[1] = float(colour_[v].g) * scale_[1];
