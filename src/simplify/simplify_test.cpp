@@ -679,14 +679,14 @@ TEST(Simplifier, sameBytesOnEveryInstructionSet) {
     const Case book = wholeCase(toLattice(bookShape(20), 20000), 0.1);
     const SimplifyOutput first = simplify(c), first_book = simplify(book);
     int targets = 0;
-    for (int64_t all = hwy::SupportedTargets(), target = 1; all != 0; target *= 2) {
+    for (uint64_t all = uint64_t(hwy::SupportedTargets()), target = 1; all != 0; target *= 2) {
         if ((all & target) == 0) continue;
         all &= ~target;
-        hwy::SetSupportedTargetsForTest(target);
+        hwy::SetSupportedTargetsForTest(int64_t(target));
         const SimplifyOutput out = simplify(c), out_book = simplify(book);
         hwy::SetSupportedTargetsForTest(0);
-        EXPECT_TRUE(sameMesh(first.mesh, out.mesh)) << hwy::TargetName(target);
-        EXPECT_TRUE(sameMesh(first_book.mesh, out_book.mesh)) << hwy::TargetName(target);
+        EXPECT_TRUE(sameMesh(first.mesh, out.mesh)) << hwy::TargetName(int64_t(target));
+        EXPECT_TRUE(sameMesh(first_book.mesh, out_book.mesh)) << hwy::TargetName(int64_t(target));
         ++targets;
     }
     EXPECT_GE(targets, 2);

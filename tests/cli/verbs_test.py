@@ -299,7 +299,7 @@ class Shown(VerbTest):
     def test_view_does_as_a_script_says(self):
         self.write("s.txt", "# turn it\nwait\nscreenshot a.png\ndrag left 200 150 300 180\n"
                    "wheel 3 200 150\nkey 5\nwait\nscreenshot b.png\nquit\n")
-        screen = {"SDL_VIDEODRIVER": "offscreen"}
+        screen = {"SDL_VIDEODRIVER": "offscreen", "SDL_RENDER_DRIVER": "software"}
         run = self.run_pietra("view", "statue.pietra", "--size", "400x300", "--script", "s.txt",
                               env=screen)
         self.assertEqual((run.returncode, run.stdout), (0, ""), run.stderr)
