@@ -420,18 +420,10 @@ TEST(ObjSource, readsLargeFilesInLittleMemory) {
     std::string().swap(text);
     const size_t before = residentBytes();
     const auto source = openSource({path});
-    VertexBatch vertices;
-    TriangleBatch triangles;
-    size_t most = residentBytes();
-    uint64_t count = 0;
-    while (source->readVertices(vertices)) most = std::max(most, residentBytes());
-    while (source->readTriangles(triangles)) {
-        most = std::max(most, residentBytes());
-        count += triangles.triangle.size();
-    }
-    EXPECT_EQ(count, 400000u);
+    const ReadingMemory memory = memoryOfReading(*source);
+    EXPECT_EQ(memory.triangles, 400000u);
 #ifndef __SANITIZE_ADDRESS__  // which keeps freed memory for a while
-    EXPECT_LT(most, before + (size_t(12) << 20));
+    EXPECT_LT(memory.most, before + (size_t(12) << 20));
 #endif
 }
 

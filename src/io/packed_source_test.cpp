@@ -14,20 +14,6 @@
 namespace pietra {
 namespace {
 
-std::string gzip(const std::string& text) {
-    std::string out(text.size() + 1000, '\0');
-    z_stream stream{};
-    deflateInit2(&stream, 1, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
-    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
-    stream.avail_in = uInt(text.size());
-    stream.next_out = reinterpret_cast<Bytef*>(out.data());
-    stream.avail_out = uInt(out.size());
-    EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-    out.resize(stream.total_out);
-    deflateEnd(&stream);
-    return out;
-}
-
 std::string xz(const std::string& text) {
     std::string out(text.size() + 1000, '\0');
     size_t size = 0;
@@ -52,7 +38,7 @@ struct Packer {
     const char* name;
     std::string (*pack)(const std::string&);
 };
-constexpr Packer kPackers[] = {{"gzip", gzip}, {"xz", xz}, {"zstd", zstd}};
+constexpr Packer kPackers[] = {{"gzip", gzipped}, {"xz", xz}, {"zstd", zstd}};
 
 std::string someText(size_t bytes) {
     std::string text;
@@ -101,7 +87,7 @@ TEST(PackedSource, takesMembersOneAfterTheOther) {
     const std::string skippable("\x50\x2a\x4d\x18\x03\0\0\0abc", 11);
     EXPECT_TRUE(readAll(*openBytes(dir.write("a", skippable + zstd(a) + skippable + zstd(b)))) ==
                 a + b);
-    EXPECT_TRUE(readAll(*openBytes(dir.write("a", gzip(a) + std::string(512, '\0')))) == a);
+    EXPECT_TRUE(readAll(*openBytes(dir.write("a", gzipped(a) + std::string(512, '\0')))) == a);
     EXPECT_TRUE(readAll(*openBytes(dir.write("a", xz(a) + std::string(512, '\0')))) == a);
 }
 

@@ -413,18 +413,10 @@ TEST(PlySource, joinsManyFilesInTheMemoryOfOne) {
     const std::vector<std::string> paths(40, path);
     const size_t before = residentBytes();
     const auto source = openSource(paths);
-    VertexBatch vertices;
-    TriangleBatch triangles;
-    size_t most = residentBytes();
-    uint64_t count = 0;
-    while (source->readVertices(vertices)) most = std::max(most, residentBytes());
-    while (source->readTriangles(triangles)) {
-        most = std::max(most, residentBytes());
-        count += triangles.triangle.size();
-    }
-    EXPECT_EQ(count, 40u * 125000);
+    const ReadingMemory memory = memoryOfReading(*source);
+    EXPECT_EQ(memory.triangles, 40u * 125000);
 #ifndef __SANITIZE_ADDRESS__  // which keeps freed memory for a while
-    EXPECT_LT(most, before + (size_t(12) << 20));
+    EXPECT_LT(memory.most, before + (size_t(12) << 20));
 #endif
 }
 
@@ -633,12 +625,8 @@ TEST(PlySource, readsLargeFilesInLittleMemory) {
     // The builder's own memory has been the peak so far: measure what is resident now instead.
     const size_t before = residentBytes();
     const auto source = openSource({path});
-    VertexBatch vertices;
-    TriangleBatch triangles;
-    size_t most = 0;
-    while (source->readVertices(vertices)) most = std::max(most, residentBytes());
-    while (source->readTriangles(triangles)) most = std::max(most, residentBytes());
-    EXPECT_LT(most, before + (size_t(12) << 20));
+    const ReadingMemory memory = memoryOfReading(*source);
+    EXPECT_LT(memory.most, before + (size_t(12) << 20));
 }
 
 TEST(PlySource, realFilesHaveTheCountsMeasuredByOthers) {

@@ -288,12 +288,8 @@ TEST(StlSource, readsLargeFilesInLittleMemory) {
     }
     const size_t before = residentBytes();
     const auto source = openSource({path});
-    VertexBatch vertices;
-    TriangleBatch triangles;
-    size_t most = 0;
-    while (source->readVertices(vertices)) most = std::max(most, residentBytes());
-    while (source->readTriangles(triangles)) most = std::max(most, residentBytes());
-    EXPECT_LT(most, before + (size_t(8) << 20));
+    const ReadingMemory memory = memoryOfReading(*source);
+    EXPECT_LT(memory.most, before + (size_t(8) << 20));
 }
 
 TEST(StlSource, realFilesHaveTheCountsMeasuredByOthers) {

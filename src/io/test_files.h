@@ -5,12 +5,14 @@
 #include <unistd.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <string>
 
+#include "base/budget.h"
 #include "base/error.h"
 #include "io/triangle_source.h"
 
@@ -100,6 +102,24 @@ inline std::string faultOf(const std::string& path) {
     } catch (const Error& e) {
         return e.what();
     }
+}
+
+/// The largest resident memory of the process while an opened source is read once, and the number of
+/// triangles that come.
+struct ReadingMemory {
+    size_t most;
+    uint64_t triangles = 0;
+};
+inline ReadingMemory memoryOfReading(TriangleSource& source) {
+    ReadingMemory memory{residentBytes()};
+    VertexBatch vertices;
+    TriangleBatch triangles;
+    while (source.readVertices(vertices)) memory.most = std::max(memory.most, residentBytes());
+    while (source.readTriangles(triangles)) {
+        memory.most = std::max(memory.most, residentBytes());
+        memory.triangles += triangles.triangle.size();
+    }
+    return memory;
 }
 
 /// The bytes of a gzip file that holds `text`.

@@ -55,8 +55,9 @@ bool EyeSide::mayBeInside() const {
 bool eyeMayBeInside(const ModelReader& model, const View& view) {
     EyeSide side(view.eye());
     std::mutex mutex;
-    const Cut cut = cutByView(model.nodes(), view, kEyeSidePixels);
-    visitPatches(model, cut.nodes, [&](NodeIndex i, const Mesh& mesh) {
+    std::vector<NodeIndex> closed = cutByView(model.nodes(), view, kEyeSidePixels).nodes;
+    std::erase_if(closed, [&](NodeIndex i) { return !model.nodes()[i].closed; });
+    visitPatches(model, closed, [&](NodeIndex i, const Mesh& mesh) {
         EyeSide part(view.eye());
         part.add(model.nodes()[i], mesh);
         const std::lock_guard lock(mutex);

@@ -19,16 +19,17 @@ PageLoader::~PageLoader() {
     for (std::thread& thread : threads_) thread.join();
 }
 
-void PageLoader::want(std::vector<PageKey> wanted, std::vector<PageKey>& begun) {
+std::vector<PageKey> PageLoader::forget() {
     const std::lock_guard lock(mutex_);
-    const auto has_begun = [&](const PageKey& key) {
-        return std::find(begun_.begin(), begun_.end(), key) != begun_.end();
-    };
     queue_.clear();
-    for (const PageKey& key : wanted)
-        if (!has_begun(key)) queue_.push_back(key);
-    begun.insert(begun.end(), begun_.begin(), begun_.end());
-    if (!queue_.empty()) wake_.notify_all();
+    return begun_;
+}
+
+void PageLoader::want(std::span<const PageKey> wanted) {
+    if (wanted.empty()) return;
+    const std::lock_guard lock(mutex_);
+    queue_.assign(wanted.begin(), wanted.end());
+    wake_.notify_all();
 }
 
 void PageLoader::take(std::vector<LoadedPage>& pages) {

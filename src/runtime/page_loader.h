@@ -1,14 +1,15 @@
 #pragma once
 // Threads that read and decode pages for a frame thread that never waits for them.
 //
-// The frame thread says each frame which pages are wanted, best first; what no thread has begun is
-// forgotten then. Decoded pages wait until they are taken. All functions but the destructor return
+// The frame thread says each frame which pages are wanted, best first, after what no thread has begun
+// is forgotten. Decoded pages wait until they are taken. All functions but the destructor return
 // at once and are for one thread; the loader's threads end in the destructor.
 
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <mutex>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -33,9 +34,11 @@ public:
     PageLoader(const PageLoader&) = delete;
     PageLoader& operator=(const PageLoader&) = delete;
 
-    /// Replaces what no thread has begun by `wanted`, best first. Appends to `begun` the pages that
-    /// threads have begun and nobody has taken.
-    void want(std::vector<PageKey> wanted, std::vector<PageKey>& begun);
+    /// Forgets what no thread has begun. Returns the pages that threads have begun and nobody has
+    /// taken; there will be no more of them before want().
+    std::vector<PageKey> forget();
+    /// After forget(): pages to load, best first, none of them begun.
+    void want(std::span<const PageKey> wanted);
     /// Appends what is ready, in the order in which it became so.
     void take(std::vector<LoadedPage>& pages);
     /// Bytes read from files so far.

@@ -59,7 +59,7 @@ ReadTimes visitInOrder(const ModelReader& model, std::span<const NodeIndex> node
     return {double(load_ns) * 1e-6, double(decode_ns) * 1e-6};
 }
 
-size_t largestDecodedPageBytes(const ModelReader& model) {
+std::vector<size_t> decodedPageBytes(const ModelReader& model) {
     const AttributeSchema& schema = model.info().schema;
     const size_t vertex_bytes = sizeof(Vec3i) + sizeof(OctNormal) +
                                 (schema.colours ? sizeof(Rgba8) : 0) +
@@ -67,6 +67,11 @@ size_t largestDecodedPageBytes(const ModelReader& model) {
     std::vector<size_t> bytes(model.pageCount());
     for (const Node& node : model.nodes())
         bytes[node.page] += node.vertices * vertex_bytes + node.triangles * (sizeof(Triangle) + 1);
+    return bytes;
+}
+
+size_t largestDecodedPageBytes(const ModelReader& model) {
+    std::vector<size_t> bytes = decodedPageBytes(model);
     for (uint32_t page = 0; page < model.pageCount(); ++page) bytes[page] += model.page(page).bytes;
     return bytes.empty() ? 0 : *std::max_element(bytes.begin(), bytes.end());
 }

@@ -47,6 +47,9 @@ struct ReadTimes {
 ReadTimes visitInOrder(const ModelReader& model, std::span<const NodeIndex> nodes, size_t in_flight,
                        const RunVisitor& visit);
 
+/// What the meshes of each page take once decoded, about, in bytes.
+std::vector<size_t> decodedPageBytes(const ModelReader& model);
+
 /// What the largest page of the model takes once decoded, about, in bytes: what one page in flight
 /// costs.
 size_t largestDecodedPageBytes(const ModelReader& model);

@@ -9,6 +9,7 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "base/text.h"
+#include "runtime/patch_reader.h"
 
 namespace pietra {
 namespace {
@@ -29,14 +30,10 @@ double msSince(Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-std::vector<size_t> decodedBytes(const ModelReader& model) {
-    const AttributeSchema& schema = model.info().schema;
-    const size_t vertex = sizeof(Vec3i) + sizeof(OctNormal) + (schema.colours ? sizeof(Rgba8) : 0) +
-                          schema.scalars.size() * sizeof(float);
-    std::vector<size_t> bytes(model.pageCount(), 0);
-    for (const Node& node : model.nodes())
-        bytes[node.page] +=
-            node.vertices * vertex + node.triangles * (sizeof(Triangle) + 1) + sizeof(Mesh);
+/// Of each page in memory, with what its meshes are held by.
+std::vector<size_t> residentPageBytes(const ModelReader& model) {
+    std::vector<size_t> bytes = decodedPageBytes(model);
+    for (const Node& node : model.nodes()) bytes[node.page] += sizeof(Mesh);
     return bytes;
 }
 
@@ -48,7 +45,7 @@ struct Scene::Model {
           forest(r.nodes()),
           residency(forest, r.pageCount()),
           refiner(residency),
-          page_bytes(decodedBytes(r)),
+          page_bytes(residentPageBytes(r)),
           last_used(r.pageCount(), 0),
           bad(r.pageCount(), 0),
           patches(r.pageCount()) {}
@@ -172,23 +169,21 @@ const Frame& Scene::Impl::update(const FrameRequest& request) {
     return frame_;
 }
 
-/// What is ready becomes resident, those first that others wait for.
+/// What is ready becomes resident, after what it waits for.
 void Scene::Impl::publish() {
     loader_->take(waiting_);
-    for (bool again = true; again;) {
-        again = false;
-        for (LoadedPage& page : waiting_) again |= tryArrive(page);
-        waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(),
-                                      [](const LoadedPage& p) {
-                                          return p.key == PageKey{~0u, ~0u};
-                                      }),
-                       waiting_.end());
+    for (size_t i = 0; i < waiting_.size();) {
+        if (!tryArrive(waiting_[i])) {
+            ++i;
+            continue;
+        }
+        waiting_.erase(waiting_.begin() + ptrdiff_t(i));
+        i = 0;  // others may have waited for it
     }
 }
 
-/// True if the page has gone from the list, which its key then tells.
+/// True if the page is done with.
 bool Scene::Impl::tryArrive(LoadedPage& page) {
-    if (page.key.model == ~0u) return false;
     Model& model = *models_[page.key.model];
     if (!page.fault.empty()) {
         model.bad[page.key.page] = 1;
@@ -201,7 +196,6 @@ bool Scene::Impl::tryArrive(LoadedPage& page) {
         model.last_used[page.key.page] = frame_number_;
         resident_bytes_ += model.page_bytes[page.key.page];
     }
-    page.key = {~0u, ~0u};
     return true;
 }
 
@@ -267,8 +261,7 @@ void Scene::Impl::prefetch(const FrameRequest& request) {
 
 /// Hands the loader what fits into the budget, after evicting what has not been used for longest.
 void Scene::Impl::load() {
-    std::vector<PageKey> begun, wanted;
-    loader_->want({}, begun);
+    std::vector<PageKey> wanted, begun = loader_->forget();
     for (const LoadedPage& page : waiting_) begun.push_back(page.key);
     reserved_bytes_ = 0;
     for (const PageKey& key : begun) reserved_bytes_ += models_[key.model]->page_bytes[key.page];
@@ -283,8 +276,7 @@ void Scene::Impl::load() {
         reserved_bytes_ += bytes;
         wanted.push_back(page.key);
     }
-    begun.clear();
-    loader_->want(std::move(wanted), begun);
+    loader_->want(wanted);
 }
 
 bool Scene::Impl::makeRoom(size_t bytes, bool soon) {

@@ -3,7 +3,6 @@
 // point `vertex + z` to planes. Centred at its vertex, so b and c vanish at first and float
 // suffices.
 
-#include <algorithm>
 #include <cmath>
 
 #include "geometry/vec.h"
@@ -66,7 +65,6 @@ struct alignas(16) Quadric {
     void add(const Quadric& q) {
         addMatrix(q);
         b0 += q.b0, b1 += q.b1, b2 += q.b2;
-        deviation = std::max(deviation, q.deviation);
     }
 };
 static_assert(sizeof(Quadric) == 48);

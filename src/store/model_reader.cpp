@@ -279,4 +279,14 @@ void ModelReader::decode(uint32_t page, std::vector<Mesh>& patches) const {
     if (!tryDecode(page, bytes, patches, fault)) failPage(page, fault);
 }
 
+Box3d boundsOf(std::span<const ModelReader* const> models) {
+    Box3d box;
+    for (const ModelReader* model : models) {
+        const ModelInfo& info = model->info();
+        box.add(info.lattice.toInput(info.bounds.min));
+        box.add(info.lattice.toInput(info.bounds.max));
+    }
+    return box;
+}
+
 }  // namespace pietra

@@ -80,4 +80,7 @@ private:
     std::vector<LevelRange> levels_;
 };
 
+/// Of all the models' vertices, in input coordinates.
+Box3d boundsOf(std::span<const ModelReader* const> models);
+
 }  // namespace pietra

@@ -86,16 +86,6 @@ public:
     std::optional<ImguiDraw> imgui;
 };
 
-/// What is around all models, in input coordinates.
-Box3d boundsOf(const std::vector<const ModelReader*>& models) {
-    Box3d box;
-    for (const ModelReader* model : models) {
-        box.add(model->info().lattice.toInput(model->info().bounds.min));
-        box.add(model->info().lattice.toInput(model->info().bounds.max));
-    }
-    return box;
-}
-
 /// A name that is not taken: `stem`-1.`ending` and so on, in the current folder.
 std::string freeName(const char* stem, const char* ending) {
     for (int i = 1;; ++i)

@@ -6,18 +6,8 @@ ModelFiles::ModelFiles(const std::vector<std::string>& paths) {
     for (const std::string& path : paths) models.push_back(std::make_unique<ModelReader>(path));
 }
 
-Box3d boundsOf(const ModelReader& model) {
-    const ModelInfo& info = model.info();
-    Box3d box;
-    box.add(info.lattice.toInput(info.bounds.min));
-    box.add(info.lattice.toInput(info.bounds.max));
-    return box;
-}
-
 Box3d ModelFiles::bounds() const {
-    Box3d box;
-    for (const auto& model : models) box.add(boundsOf(*model));
-    return box;
+    return boundsOf(views());
 }
 
 std::vector<Sphere> ModelFiles::balls() const {

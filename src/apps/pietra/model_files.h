@@ -22,7 +22,5 @@ struct ModelFiles {
     std::vector<const ModelReader*> views() const;
 };
 
-/// Of the whole model, in input coordinates.
-Box3d boundsOf(const ModelReader& model);
 
 }  // namespace pietra

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "apps/pietra/camera_json.h"
+#include "apps/pietra/draw_options.h"
 #include "apps/pietra/flight.h"
 #include "apps/pietra/json_report.h"
 #include "apps/pietra/limits.h"
@@ -50,7 +51,7 @@ private:
     double pixels_ = 1;
     std::string renderer_ = "cpu";
     std::string samples_ = "1";
-    std::string cull_ = "all";
+    CullOption cull_;
     std::string prefetch_ = "on";
     uint64_t ram_ = uint64_t(1) << 30;
     bool cold_ = false;
@@ -93,8 +94,7 @@ void BenchVerb::declare(OptionSet& options) {
     options.number("--pixels", "T", pixels_, {.min = 0}, "Tolerance in pixels.");
     options.choice("--renderer", renderer_, {"cpu", "gl", "none"}, "What draws.");
     options.choice("--samples", samples_, {"1", "4"}, "Coverage samples a pixel.");
-    options.choice("--cull", cull_, {"none", "frustum", "cone", "occlusion", "all"},
-                   "What is left out, as for render.");
+    cull_.declare(options, "What is left out, as for render.");
     options.choice("--prefetch", prefetch_, {"on", "off"},
                    "Load what views to come will need, too.");
     options.size("--ram", ram_, "Most memory for what is loaded.");
@@ -138,8 +138,7 @@ FlightSettings BenchVerb::settings(const CameraPath& path) const {
         frames_ ? int(*frames_) : 1 + int(std::lround(path.seconds * kFramesPerSecond));
     settings.size = size_;
     settings.pixels = pixels_;
-    const bool all = cull_ == "all";
-    settings.culling = {all || cull_ == "frustum", all || cull_ == "cone", all};
+    settings.culling = cull_.culling();
     settings.prefetch = prefetch_ == "on";
     settings.samples = samples_ == "4" ? 4 : 1;
     settings.draw = renderer_ != "none";

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "apps/pietra/camera_options.h"
+#include "apps/pietra/draw_options.h"
 #include "apps/pietra/json_report.h"
 #include "apps/pietra/limits.h"
 #include "apps/pietra/logging.h"
@@ -42,7 +43,6 @@ private:
     void parseShow(const std::string& word);
     void parseRange(const std::string& text);
     void parseLight(const std::string& text);
-    Culling culling() const;
     OfflineSettings settings(const ModelFiles& files) const;
     void showScalar(const ModelFiles& files, ShadeSettings& shade) const;
     OfflinePicture draw(const ModelFiles& files, const Camera& camera, Progress& progress) const;
@@ -58,7 +58,7 @@ private:
     std::optional<std::pair<double, double>> range_;
     std::string renderer_ = "cpu";
     std::string samples_ = "1";
-    std::string cull_ = "all";
+    CullOption cull_;
     bool two_sided_ = false;
     Vec3d light_ = ShadeSettings{}.light_direction;
     uint64_t ram_ = uint64_t(1) << 30;
@@ -110,8 +110,8 @@ void RenderVerb::declare(OptionSet& options) {
                    [this](const std::string& text) { parseRange(text); });
     options.choice("--renderer", renderer_, {"cpu", "gl"}, "What draws.");
     options.choice("--samples", samples_, {"1", "4"}, "Coverage samples a pixel.");
-    options.choice("--cull", cull_, {"none", "frustum", "cone", "occlusion", "all"},
-                   "What is left out: what lies outside the picture; closed parts that face away; "
+    cull_.declare(options,
+                  "What is left out: what lies outside the picture; closed parts that face away; "
                    "what is hidden, which a single picture cannot know before it is drawn; or all "
                    "of these and what is smaller than half the tolerance.");
     options.flag("--two-sided", two_sided_, "Draw and light closed parts from both sides, too.");
@@ -157,11 +157,6 @@ void RenderVerb::parseLight(const std::string& text) {
     if (glm::dot(light_, light_) == 0) throw UsageError(fmt::format("'{}' is no direction", text));
 }
 
-Culling RenderVerb::culling() const {
-    const bool all = cull_ == "all";
-    return {all || cull_ == "frustum", !two_sided_ && (all || cull_ == "cone"), all};
-}
-
 void RenderVerb::showScalar(const ModelFiles& files, ShadeSettings& shade) const {
     const std::vector<std::string>& first = files.models[0]->info().schema.scalars;
     const auto found = std::find(first.begin(), first.end(), scalar_);
@@ -180,7 +175,8 @@ void RenderVerb::showScalar(const ModelFiles& files, ShadeSettings& shade) const
 OfflineSettings RenderVerb::settings(const ModelFiles& files) const {
     OfflineSettings settings;
     settings.pixels = pixels_;
-    settings.culling = culling();
+    settings.culling = cull_.culling();
+    settings.culling.cone &= !two_sided_;
     settings.renderer = renderer_ == "gl" ? DrawWith::kGl : DrawWith::kCpu;
     settings.samples = samples_ == "4" ? 4 : 1;
     settings.memory_bytes = size_t(ram_);

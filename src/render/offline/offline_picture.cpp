@@ -58,7 +58,8 @@ public:
         const auto start = Clock::now();
         uint64_t patches = 0;
         for (const SceneModel& model : models_)
-            settings_.shade.two_sided |= eyeMayBeInside(*model.reader, model.view);
+            settings_.shade.two_sided =
+                settings_.shade.two_sided || eyeMayBeInside(*model.reader, model.view);
         settings_.culling.cone &= !settings_.shade.two_sided;
         for (SceneModel& model : models_) {
             select(model);
