@@ -104,8 +104,8 @@ inline std::string faultOf(const std::string& path) {
     }
 }
 
-/// The largest resident memory of the process while an opened source is read once, and the number of
-/// triangles that come.
+/// The largest resident memory of the process while an opened source is read once, and the number
+/// of triangles that come.
 struct ReadingMemory {
     size_t most;
     uint64_t triangles = 0;

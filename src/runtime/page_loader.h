@@ -1,9 +1,9 @@
 #pragma once
 // Threads that read and decode pages for a frame thread that never waits for them.
 //
-// The frame thread says each frame which pages are wanted, best first, after what no thread has begun
-// is forgotten. Decoded pages wait until they are taken. All functions but the destructor return
-// at once and are for one thread; the loader's threads end in the destructor.
+// The frame thread says each frame which pages are wanted, best first, after what no thread has
+// begun is forgotten. Decoded pages wait until they are taken. All functions but the destructor
+// return at once and are for one thread; the loader's threads end in the destructor.
 
 #include <condition_variable>
 #include <cstdint>

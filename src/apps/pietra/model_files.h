@@ -22,5 +22,4 @@ struct ModelFiles {
     std::vector<const ModelReader*> views() const;
 };
 
-
 }  // namespace pietra
