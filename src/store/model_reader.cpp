@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 
 #include "base/error.h"
 #include "base/hash.h"
@@ -277,6 +279,16 @@ void ModelReader::decode(uint32_t page, std::vector<Mesh>& patches) const {
     readPage(page, bytes);
     std::string fault;
     if (!tryDecode(page, bytes, patches, fault)) failPage(page, fault);
+}
+
+bool isModelFile(const std::string& path) try {
+    std::error_code fault;
+    if (!std::filesystem::is_regular_file(path, fault)) return false;
+    std::array<char, kModelMagic.size()> magic{};
+    File(path, File::Mode::kRead).readSomeAt(0, magic.data(), magic.size());
+    return std::equal(magic.begin(), magic.end(), kModelMagic.begin());
+} catch (const IoError&) {
+    return false;
 }
 
 Box3d boundsOf(std::span<const ModelReader* const> models) {

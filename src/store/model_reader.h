@@ -80,6 +80,9 @@ private:
     std::vector<LevelRange> levels_;
 };
 
+/// Whether a regular file begins as a model does; false too where it cannot be read.
+bool isModelFile(const std::string& path);
+
 /// Of all the models' vertices, in input coordinates.
 Box3d boundsOf(std::span<const ModelReader* const> models);
 
