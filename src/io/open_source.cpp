@@ -25,21 +25,31 @@ std::string lowerCaseName(const std::string& path) {
     return name;
 }
 
-std::unique_ptr<TriangleSource> openOne(const std::string& path) {
-    auto reader = std::make_unique<ByteReader>(openBytes(path));
-    const size_t size = std::min(reader->peek(kHeadBytes), kHeadBytes);
+/// Throws InputError where there is none that Pietra reads.
+const MeshFormat& formatOf(ByteReader& reader, const std::string& path) {
+    const size_t size = std::min(reader.peek(kHeadBytes), kHeadBytes);
     if (size == 0) throw InputError(path, "", "the file is empty");
-    const std::span<const uint8_t> head(reader->data(), size);
+    const std::span<const uint8_t> head(reader.data(), size);
     const std::string name = lowerCaseName(path);
     std::string known;
     for (const MeshFormat& format : meshFormats()) {
-        if (format.matches(head, name)) return format.open(std::move(reader));
+        if (format.matches(head, name)) return format;
         known += fmt::format("{}{}", known.empty() ? "" : ", ", format.name);
     }
     throw InputError(path, "", fmt::format("is of no format that Pietra reads ({})", known));
 }
 
+std::unique_ptr<TriangleSource> openOne(const std::string& path) {
+    auto reader = std::make_unique<ByteReader>(openBytes(path));
+    return formatOf(*reader, path).open(std::move(reader));
+}
+
 }  // namespace
+
+void checkMeshFormat(const std::string& path) {
+    ByteReader reader(openBytes(path));
+    formatOf(reader, path);
+}
 
 std::unique_ptr<TriangleSource> openSource(const std::vector<std::string>& paths) {
     CHECK(!paths.empty());

@@ -62,5 +62,7 @@ public:
 /// Opens one or several files as one model, by content (magic bytes), not by name alone. Throws
 /// IoError (cannot open), InputError (no known format, bad header).
 std::unique_ptr<TriangleSource> openSource(const std::vector<std::string>& paths);
+/// Throws what openSource() throws where a file is of no known format. Reads its first bytes alone.
+void checkMeshFormat(const std::string& path);
 
 }  // namespace pietra

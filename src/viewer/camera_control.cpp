@@ -24,10 +24,6 @@ double pixelsPerUnit(const Camera& camera, const PictureSize& size) {
 CameraControl::CameraControl(const Box3d& bounds, UpAxis up, const Camera& start)
     : bounds_(bounds), up_(up == UpAxis::kY ? Vec3d(0, 1, 0) : Vec3d(0, 0, 1)), camera_(start) {}
 
-void CameraControl::setCamera(const Camera& camera) {
-    camera_ = camera;
-}
-
 CameraControl::Axes CameraControl::axes() const {
     const Vec3d forward = glm::normalize(camera_.target - camera_.eye);
     const Vec3d right = glm::normalize(glm::cross(forward, camera_.up));

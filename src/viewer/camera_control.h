@@ -16,7 +16,7 @@ public:
     CameraControl(const Box3d& bounds, UpAxis up, const Camera& start);
 
     const Camera& camera() const { return camera_; }
-    void setCamera(const Camera& camera);
+    void setBounds(const Box3d& bounds) { bounds_ = bounds; }
     Style style() const { return style_; }
     void setStyle(Style style) { style_ = style; }
 

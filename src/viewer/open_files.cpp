@@ -91,6 +91,12 @@ void OpenFiles::stopBuild(const BackgroundBuild* build) {
     std::erase_if(builds_, [&](const auto& other) { return other.get() == build; });
 }
 
+void OpenFiles::closeAfter(size_t count, const std::string& why) {
+    for (size_t i = count; i < models_.size(); ++i)
+        addFault(fmt::format("{}: {}", models_[i]->path(), why));
+    models_.resize(count);
+}
+
 std::vector<const ModelReader*> OpenFiles::models() const {
     std::vector<const ModelReader*> all;
     for (const auto& model : models_) all.push_back(model.get());

@@ -27,9 +27,12 @@ public:
     bool poll();
 
     std::vector<const ModelReader*> models() const;
+    /// Closes all models but the first `count`, saying why.
+    void closeAfter(size_t count, const std::string& why);
     const std::vector<std::string>& offers() const { return offers_; }
     const std::vector<std::unique_ptr<BackgroundBuild>>& builds() const { return builds_; }
     void stopBuild(const BackgroundBuild* build);
+    void addFault(const std::string& sentence) { faults_.push_back(sentence); }
     /// Sentences about what could not be opened or built.
     const std::vector<std::string>& faults() const { return faults_; }
 

@@ -26,6 +26,7 @@ constexpr const char* kHelp =
     "D               measure a distance by two clicks\n"
     "C               record the camera's path\n"
     "P               save a picture\n"
+    "drop a file     open a model, or build that of a mesh\n"
     "Tab, F1         this panel, this help\n"
     "Esc             quit";
 
@@ -100,6 +101,35 @@ void drawPanel(ViewState& state, const FrameFigures& figures, const CameraContro
         text(kHelp);
         ImGui::End();
     }
+}
+
+void drawFiles(OpenFiles& files) {
+    if (files.offers().empty() && files.builds().empty()) return;
+    const ImVec2 window = ImGui::GetIO().DisplaySize;
+    ImGui::SetNextWindowPos(ImVec2(window.x / 2, window.y / 2), ImGuiCond_Always,
+                            ImVec2(0.5f, 0.5f));
+    ImGui::SetNextWindowBgAlpha(0.85f);
+    ImGui::Begin("Files", nullptr,
+                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoTitleBar |
+                     ImGuiWindowFlags_NoFocusOnAppearing);
+    for (const std::string& mesh : files.offers())
+        text(fmt::format("{} is a mesh. Its model would be\n{}", mesh, modelPathOf(mesh)));
+    if (!files.offers().empty()) {
+        if (ImGui::Button("Build (Enter)")) files.acceptOffers();
+        ImGui::SameLine();
+        if (ImGui::Button("Not now")) files.refuseOffers();
+    }
+    const BackgroundBuild* stopped = nullptr;
+    for (const auto& build : files.builds()) {
+        text(fmt::format("building {}", build->model()));
+        ImGui::ProgressBar(build->fraction(), ImVec2(320, 0), build->text().c_str());
+        ImGui::SameLine();
+        ImGui::PushID(build.get());
+        if (ImGui::Button("Stop")) stopped = build.get();
+        ImGui::PopID();
+    }
+    files.stopBuild(stopped);
+    ImGui::End();
 }
 
 }  // namespace pietra

@@ -8,6 +8,7 @@
 #include "render/shading.h"
 #include "runtime/scene.h"
 #include "viewer/camera_control.h"
+#include "viewer/open_files.h"
 
 namespace pietra {
 
@@ -44,8 +45,11 @@ struct FrameFigures {
     }
 };
 
-/// Within an ImGui frame.
+/// Within an ImGui frame, as drawFiles.
 void drawPanel(ViewState& state, const FrameFigures& figures, const CameraControl& control,
                const std::vector<std::string>& faults);
+
+/// Meshes that are offered to be built, and builds that run: nothing where there are none.
+void drawFiles(OpenFiles& files);
 
 }  // namespace pietra

@@ -81,6 +81,11 @@ void Script::parse(const std::string& line) {
         steps_.push_back(step);
     } else if (word == "screenshot" && in >> name) {
         steps_.push_back({Step::Kind::kScreenshot, {}, name});
+    } else if (word == "drop" && in >> name) {
+        Step step{Step::Kind::kEvent, {}, {}};
+        step.event.type = SDL_DROPFILE;
+        step.event.drop.file = SDL_strdup(name.c_str());
+        steps_.push_back(step);
     } else if (word == "key" && in >> name) {
         if (const SDL_Keycode key = SDL_GetKeyFromName(name.c_str()); key != SDLK_UNKNOWN)
             addKey(key);

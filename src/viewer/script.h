@@ -1,11 +1,12 @@
 #pragma once
 // A user made of a file, for tests and demonstrations: one command a line, run in turn.
 //
-//   wait                      until the picture is as fine as asked for
+//   wait                      until all builds have ended and the picture is as fine as asked for
 //   key NAME                  a key as SDL names it: F, [, 1, F1, Escape
 //   drag BUTTON X0 Y0 X1 Y1   left, middle, right; in eight steps
 //   click BUTTON X Y          and "double X Y": the left one, twice
 //   wheel STEPS X Y           upwards is positive
+//   drop FILE                 onto the window
 //   screenshot FILE           of the window, as PNG
 //   quit
 //

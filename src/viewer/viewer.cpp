@@ -16,6 +16,7 @@
 #include "render/raster/rasteriser.h"
 #include "runtime/camera_path.h"
 #include "viewer/imgui_draw.h"
+#include "viewer/open_files.h"
 #include "viewer/panel.h"
 #include "viewer/script.h"
 
@@ -48,11 +49,11 @@ using Texture = std::unique_ptr<SDL_Texture, Destroy<SDL_DestroyTexture>>;
 /// SDL and Dear ImGui, from beginning to end.
 class Toolkit {
 public:
-    Toolkit(const std::string& title, const PictureSize& size) {
+    explicit Toolkit(const PictureSize& size) {
         SDL_SetHint(SDL_HINT_VIDEO_X11_NET_WM_BYPASS_COMPOSITOR, "0");
         if (SDL_Init(SDL_INIT_VIDEO) != 0)
             throw UsageError(fmt::format("no window can be opened: {}", SDL_GetError()));
-        window.reset(SDL_CreateWindow(title.c_str(), SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED,
+        window.reset(SDL_CreateWindow("Pietra", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED,
                                       size.width, size.height,
                                       SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI));
         if (window) renderer.reset(SDL_CreateRenderer(window.get(), -1, 0));
@@ -96,15 +97,14 @@ std::string freeName(const char* stem, const char* ending) {
 
 class Viewer {
 public:
-    Viewer(const std::vector<const ModelReader*>& models, const ViewerSettings& settings)
-        : models_(models),
+    Viewer(OpenFiles& files, const ViewerSettings& settings)
+        : files_(files),
           settings_(settings),
-          toolkit_(settings.title, settings.size),
-          scene_(models, settings.scene),
-          control_(boundsOf(models), settings.up,
-                   standardCamera(StandardView::kFront, settings.up, boundsOf(models),
-                                  toolkit_.pictureSize())) {
+          toolkit_(settings.size),
+          control_(wholeScene(Box3d{{Vec3d(0)}, {Vec3d(1)}})) {
+        nothing_.converged = true;
         if (!settings.script.empty()) script_ = Script(settings.script);
+        showModels();
         state_.pixels = settings.pixels;
         figures_.ram_bytes = settings.scene.ram_bytes;
     }
@@ -114,6 +114,7 @@ public:
             const auto start = Clock::now();
             handleEvents();
             flyByKeys();
+            openWhatIsBuilt();
             if (!ready()) drawScene();
             present();
             last_frame_ = secondsSince(start);
@@ -123,6 +124,10 @@ public:
     }
 
 private:
+    CameraControl wholeScene(const Box3d& bounds) const;
+    void showModels();
+    void openWhatIsBuilt();
+    void drop(const std::string& file);
     void handleEvents();
     void runScript();
     void handle(const SDL_Event& event);
@@ -143,15 +148,18 @@ private:
     void present();
     std::optional<Vec3d> pointAt(int x, int y) const;
     Vec2d pictureCursor() const;
+    std::vector<std::string> faults() const;
     void savePicture();
     void saveWindow(const std::string& file);
     void record();
     void toggleRecording();
 
+    OpenFiles& files_;
     std::vector<const ModelReader*> models_;
     ViewerSettings settings_;
     Toolkit toolkit_;
-    Scene scene_;
+    std::optional<Scene> scene_;  // none as long as there are no models
+    Frame nothing_;               // of no models
     CameraControl control_;
     Script script_;
     ViewState state_;
@@ -173,6 +181,47 @@ private:
     int cursor_x_ = 0, cursor_y_ = 0;
 };
 
+CameraControl Viewer::wholeScene(const Box3d& bounds) const {
+    return {bounds, settings_.up,
+            standardCamera(StandardView::kFront, settings_.up, bounds, toolkit_.pictureSize())};
+}
+
+/// The models that are open now; the camera stays where it is, but for the first ones.
+void Viewer::showModels() {
+    const std::vector<const ModelReader*> models = files_.models();
+    if (models.empty()) return;
+    scene_.reset();  // two would need the memory twice
+    scene_.emplace(models, settings_.scene);
+    const Box3d bounds = boundsOf(models);
+    if (models_.empty()) control_ = wholeScene(bounds);
+    control_.setBounds(bounds);
+    models_ = models;
+    SDL_SetWindowTitle(toolkit_.window.get(),
+                       models.size() == 1
+                           ? fmt::format("{} - Pietra", models[0]->path()).c_str()
+                           : fmt::format("{} models - Pietra", models.size()).c_str());
+    touch();
+}
+
+void Viewer::openWhatIsBuilt() {
+    files_.poll();
+    if (files_.models().size() == models_.size()) return;
+    try {
+        showModels();
+    } catch (const MemoryError& error) {
+        files_.closeAfter(models_.size(), error.what());
+        showModels();
+    }
+}
+
+void Viewer::drop(const std::string& file) {
+    try {
+        files_.open(file, true);
+    } catch (const Error& error) {
+        files_.addFault(error.what());
+    }
+}
+
 void Viewer::handleEvents() {
     runScript();
     SDL_Event event;
@@ -186,6 +235,7 @@ void Viewer::runScript() {
     if (script_.done()) return;
     const Script::Step step = script_.front();
     if (step.kind != Script::Step::Kind::kEvent && !ready()) return;
+    if (step.kind == Script::Step::Kind::kWait && !files_.builds().empty()) return;
     script_.pop();
     if (step.kind == Script::Step::Kind::kScreenshot) saveWindow(step.file);
     if (step.kind == Script::Step::Kind::kEvent) handle(step.event);
@@ -202,6 +252,10 @@ void Viewer::handle(const SDL_Event& event) {
             break;
         case SDL_WINDOWEVENT:
             touch();
+            break;
+        case SDL_DROPFILE:
+            drop(event.drop.file);
+            SDL_free(event.drop.file);
             break;
         case SDL_MOUSEMOTION:
             if (!over_panel) handleDrag(event.motion);
@@ -236,6 +290,9 @@ void Viewer::handleKey(SDL_Keycode key) {
     switch (key) {
         case SDLK_ESCAPE:
             quit_ = true;
+            break;
+        case SDLK_RETURN:
+            files_.acceptOffers();
             break;
         case SDLK_f:
             control_.frame(toolkit_.pictureSize());
@@ -390,14 +447,15 @@ void Viewer::drawScene() {
     request.seconds = secondsSince(start_);
     request.prefetch = state_.prefetch;
     request.show_error = state_.show == Show::kError;
-    const Frame& frame = scene_.update(request);
+    const Frame& frame = scene_ ? scene_->update(request) : nothing_;
     const auto start = Clock::now();
-    const auto lattice = [&](size_t m) -> const Lattice& { return models_[m]->info().lattice; };
-    const View first(control_.camera(), size, lattice(0));
+    const auto lattice = [&](size_t m) { return models_[m]->info().lattice; };
+    const Lattice first_lattice = models_.empty() ? Lattice{} : lattice(0);
+    const View first(control_.camera(), size, first_lattice);
     if (!rasteriser_ || rasteriser_samples_ != state_.samples)
-        rasteriser_.emplace(first, lattice(0), state_.samples, shade());
+        rasteriser_.emplace(first, first_lattice, state_.samples, shade());
     else
-        rasteriser_->restart(first, lattice(0), shade());
+        rasteriser_->restart(first, first_lattice, shade());
     rasteriser_samples_ = state_.samples;
     for (size_t m = 0; m < models_.size(); ++m) {
         rasteriser_->setModel(View(control_.camera(), size, lattice(m)), lattice(m));
@@ -425,7 +483,8 @@ void Viewer::present() {
     ImGui_ImplSDL2_NewFrame();
     ImGui::NewFrame();
     const ViewState before = state_;
-    drawPanel(state_, figures_, control_, scene_.faults());
+    drawPanel(state_, figures_, control_, faults());
+    drawFiles(files_);
     if (before.pixels != state_.pixels || before.show != state_.show ||
         before.samples != state_.samples || before.frozen != state_.frozen)
         touch();
@@ -434,6 +493,12 @@ void Viewer::present() {
     SDL_RenderCopy(toolkit_.renderer.get(), texture_.get(), nullptr, nullptr);
     toolkit_.imgui->draw(*ImGui::GetDrawData());
     SDL_RenderPresent(toolkit_.renderer.get());
+}
+
+std::vector<std::string> Viewer::faults() const {
+    std::vector<std::string> all = files_.faults();
+    if (scene_) all.insert(all.end(), scene_->faults().begin(), scene_->faults().end());
+    return all;
 }
 
 void Viewer::savePicture() {
@@ -486,8 +551,10 @@ void Viewer::record() {
 
 }  // namespace
 
-void runViewer(const std::vector<const ModelReader*>& models, const ViewerSettings& settings) {
-    Viewer(models, settings).run();
+void runViewer(const std::vector<std::string>& names, const ViewerSettings& settings) {
+    OpenFiles files(settings.program);
+    for (const std::string& name : names) files.open(name, false);
+    Viewer(files, settings).run();
 }
 
 }  // namespace pietra

@@ -306,6 +306,14 @@ class Shown(VerbTest):
         self.assertEqual((run.returncode, run.stdout), (0, ""), run.stderr)
         moved = self.report("compare", "a.png", "b.png", "--json")
         self.assertGreater(moved["shade"]["p99"], 20)
+        # A mesh is offered, built beside the window when accepted, and shown; or it is dropped.
+        for first, script in (("torus.ply", "key Return\n"), ("statue.pietra", "drop torus.ply\n")):
+            write_torus(self.path("torus.ply"), 40, 24)
+            self.write("s.txt", script + "wait\nkey F\nkey Tab\nwait\nscreenshot c.png\nquit\n")
+            run = self.run_pietra("view", first, "--size", "400x300", "--script", "s.txt", env=screen)
+            self.assertEqual((run.returncode, run.stdout), (0, ""), run.stderr)
+            self.assertEqual(self.report("info", "torus.pietra", "--json")["input"]["triangles"], 1920)
+            os.remove(self.path("torus.pietra"))
         self.write("bad.txt", "wait\njump\n")
         run = self.run_pietra("view", "statue.pietra", "--script", "bad.txt", env=screen)
         self.assertEqual((run.returncode, run.stderr),

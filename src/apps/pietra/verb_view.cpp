@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include "apps/pietra/limits.h"
-#include "apps/pietra/model_files.h"
 #include "apps/pietra/verbs.h"
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/text.h"
+#include "io/triangle_source.h"
+#include "store/model_reader.h"
 #include "viewer/viewer.h"
 
 namespace pietra {
@@ -38,13 +39,17 @@ VerbText ViewVerb::text() const {
         {"FILE... [options]"},
         {"Opens a window at once, and shows the models as finely as --pixels asks for. What has "
          "not been loaded yet is drawn coarser, without holes. No graphics card is needed.",
+         "A mesh is offered to be built first: its model is put beside it, or into the user's "
+         "cache "
+         "where that folder cannot be written. Files dropped on the window are added, meshes built "
+         "in the background.",
          "F1 in the window lists what mouse and keys do."},
         {{"look at a model", "pietra view moon.pietra"},
          {"two models in one scene, within 512 MB", "pietra view a.pietra b.pietra --ram 512M"}}};
 }
 
 void ViewVerb::declare(OptionSet& options) {
-    options.files("FILE", files_, "The models.").require();
+    options.files("FILE", files_, "Models, or meshes.").require();
     options.pictureSize("--size", size_, "Of the window, in pixels.");
     options.number("--pixels", "T", pixels_, {.min = 0.25, .max = 64}, "Tolerance in pixels.");
     options.choice("--renderer", renderer_, {"cpu", "gl"}, "What draws.");
@@ -62,17 +67,16 @@ int ViewVerb::run(const RunContext&) {
     if (renderer_ == "gl")
         throw UsageError("--renderer gl: the viewer draws on the processor so far; use cpu");
     const ThreadLimit threads(Limits{{}, jobs_}.threads());
-    const ModelFiles files(files_);
+    for (const std::string& file : files_)
+        if (!isModelFile(file)) checkMeshFormat(file);
     ViewerSettings settings;
     settings.size = size_;
     settings.pixels = pixels_;
     settings.up = up_ == "y" ? UpAxis::kY : UpAxis::kZ;
     settings.scene.ram_bytes = size_t(ram_);
-    settings.title = files_.size() == 1 ? fmt::format("{} - Pietra", files_[0])
-                                        : fmt::format("{} models - Pietra", files_.size());
     settings.script = script_;
     try {
-        runViewer(files.views(), settings);
+        runViewer(files_, settings);
     } catch (const MemoryError& error) {
         throw MemoryError(fmt::format("--ram {}: {}", formatBytes(ram_), error.what()));
     }
