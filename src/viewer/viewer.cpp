@@ -10,11 +10,13 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <optional>
 
 #include "base/error.h"
 #include "render/raster/rasteriser.h"
 #include "runtime/camera_path.h"
+#include "runtime/pick.h"
 #include "viewer/imgui_draw.h"
 #include "viewer/open_files.h"
 #include "viewer/panel.h"
@@ -115,6 +117,7 @@ public:
             handleEvents();
             flyByKeys();
             openWhatIsBuilt();
+            takePicks();
             if (!ready()) drawScene();
             present();
             last_frame_ = secondsSince(start);
@@ -147,6 +150,8 @@ private:
     void adaptToMotion();
     void present();
     std::optional<Vec3d> pointAt(int x, int y) const;
+    void lookUp(const Vec3d& shown);
+    void takePicks();
     Vec2d pictureCursor() const;
     std::vector<std::string> faults() const;
     void savePicture();
@@ -174,6 +179,11 @@ private:
     double motion_factor_ = 1;
     double last_frame_ = 0;
     bool drawn_ = false, quit_ = false;
+    struct Pick {
+        std::future<Vec3d> point;
+        int measured;  // which end of the distance, or -1
+    };
+    std::vector<Pick> picks_;
     Clock::time_point start_ = Clock::now(), touched_ = Clock::now(), last_key_{};
     Camera frozen_camera_;
     CameraPath path_;
@@ -190,7 +200,8 @@ CameraControl Viewer::wholeScene(const Box3d& bounds) const {
 void Viewer::showModels() {
     const std::vector<const ModelReader*> models = files_.models();
     if (models.empty()) return;
-    scene_.reset();  // two would need the memory twice
+    for (const Pick& pick : picks_) pick.point.wait();  // they read from models
+    scene_.reset();                                     // two would need the memory twice
     scene_.emplace(models, settings_.scene);
     const Box3d bounds = boundsOf(models);
     if (models_.empty()) control_ = wholeScene(bounds);
@@ -235,7 +246,8 @@ void Viewer::runScript() {
     if (script_.done()) return;
     const Script::Step step = script_.front();
     if (step.kind != Script::Step::Kind::kEvent && !ready()) return;
-    if (step.kind == Script::Step::Kind::kWait && !files_.builds().empty()) return;
+    if (step.kind == Script::Step::Kind::kWait && (!files_.builds().empty() || !picks_.empty()))
+        return;
     script_.pop();
     if (step.kind == Script::Step::Kind::kScreenshot) saveWindow(step.file);
     if (step.kind == Script::Step::Kind::kEvent) handle(step.event);
@@ -382,12 +394,39 @@ void Viewer::handleClick(const SDL_MouseButtonEvent& button) {
     if (state_.measuring && button.clicks == 1) {
         if (state_.measured_count == 2) state_.measured_count = 0;
         state_.measured[size_t(state_.measured_count++)] = *point;
+        lookUp(*point);
     }
     if (button.clicks == 2) {
         control_.setPivot(*point);
-        state_.message = fmt::format("pivot {:.9g} {:.9g} {:.9g}", point->x, point->y, point->z);
+        lookUp(*point);
     }
     touch();
+}
+
+/// Looks for the input's own surface behind the pixel that shows `shown`.
+void Viewer::lookUp(const Vec3d& shown) {
+    const Vec3d eye = control_.camera().eye;
+    const int measured = state_.measuring ? state_.measured_count - 1 : -1;
+    picks_.push_back({std::async(std::launch::async,
+                                 [models = models_, eye, shown] {
+                                     return pickFinest(models, eye, shown - eye).value_or(shown);
+                                 }),
+                      measured});
+}
+
+/// What was looked up replaces what was shown.
+void Viewer::takePicks() {
+    std::erase_if(picks_, [&](Pick& pick) {
+        if (pick.point.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
+        try {
+            const Vec3d p = pick.point.get();
+            state_.message = fmt::format("point {:.9g} {:.9g} {:.9g}", p.x, p.y, p.z);
+            if (pick.measured >= 0) state_.measured[size_t(pick.measured)] = p;
+        } catch (const Error& error) {
+            files_.addFault(error.what());
+        }
+        return true;
+    });
 }
 
 void Viewer::zoomTo(int steps) {
