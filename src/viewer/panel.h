@@ -9,6 +9,7 @@
 #include "runtime/scene.h"
 #include "viewer/camera_control.h"
 #include "viewer/open_files.h"
+#include "viewer/overlay.h"
 
 namespace pietra {
 
@@ -20,6 +21,7 @@ struct ViewState {
     bool prefetch = true;
     bool show_panel = true, show_help = false;
     bool frozen = false;  ///< what is drawn stays as selected, wherever the camera goes
+    ShowSpheres spheres = ShowSpheres::kNone;  ///< of the nodes drawn
     bool recording = false;
     bool measuring = false;
     std::array<Vec3d, 2> measured{};

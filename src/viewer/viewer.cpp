@@ -165,6 +165,7 @@ private:
     Toolkit toolkit_;
     std::optional<Scene> scene_;  // none as long as there are no models
     Frame nothing_;               // of no models
+    const Frame* shown_ = nullptr;
     CameraControl control_;
     Script script_;
     ViewState state_;
@@ -201,7 +202,8 @@ void Viewer::showModels() {
     const std::vector<const ModelReader*> models = files_.models();
     if (models.empty()) return;
     for (const Pick& pick : picks_) pick.point.wait();  // they read from models
-    scene_.reset();                                     // two would need the memory twice
+    shown_ = nullptr;
+    scene_.reset();  // two would need the memory twice
     scene_.emplace(models, settings_.scene);
     const Box3d bounds = boundsOf(models);
     if (models_.empty()) control_ = wholeScene(bounds);
@@ -325,6 +327,9 @@ void Viewer::handleKey(SDL_Keycode key) {
             break;
         case SDLK_l:
             light_key_ = true;
+            break;
+        case SDLK_b:
+            state_.spheres = ShowSpheres((int(state_.spheres) + 1) % 3);
             break;
         case SDLK_z:
             state_.frozen = !state_.frozen;
@@ -487,6 +492,7 @@ void Viewer::drawScene() {
     request.prefetch = state_.prefetch;
     request.show_error = state_.show == Show::kError;
     const Frame& frame = scene_ ? scene_->update(request) : nothing_;
+    shown_ = &frame;
     const auto start = Clock::now();
     const auto lattice = [&](size_t m) { return models_[m]->info().lattice; };
     const Lattice first_lattice = models_.empty() ? Lattice{} : lattice(0);
@@ -524,6 +530,12 @@ void Viewer::present() {
     const ViewState before = state_;
     drawPanel(state_, figures_, control_, faults());
     drawFiles(files_);
+    drawOverlay({.camera = control_.camera(),
+                 .selected = state_.frozen ? &frozen_camera_ : nullptr,
+                 .spheres = state_.spheres,
+                 .measured = {state_.measured.data(), size_t(state_.measured_count)},
+                 .models = models_,
+                 .frame = shown_});
     if (before.pixels != state_.pixels || before.show != state_.show ||
         before.samples != state_.samples || before.frozen != state_.frozen)
         touch();
