@@ -141,6 +141,7 @@ Vec3f patchColour(const ShadeSettings& settings, uint32_t id, const Rgba8& tint,
             return heatColour(range > 0 ? (value - settings.value_min) / range : 0);
         }
         case Show::kShaded:
+        case Show::kWire:
             return linearFromSrgb(tint) *
                    (coloured ? Vec3f(1, 1, 1) : linearFromSrgb(settings.surface));
         default:

@@ -3,6 +3,7 @@
 // views, and the step between linear light and the sRGB bytes of a picture. Only +, -, *, / and
 // sqrt, so that a picture's bytes are the same on every machine.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -22,6 +23,7 @@ enum class Show {
     kTriangles,  ///< lit, each triangle in a colour of its own
     kError,      ///< lit, DrawPatch::value from value_min (blue) to value_max (red)
     kColour,     ///< vertex colours, unlit
+    kWire,       ///< as kShaded, with the triangles' edges as dark lines
     kScalar,     ///< lit, one scalar attribute in a colour map
 };
 
@@ -53,6 +55,13 @@ inline constexpr float kSkyLight[3] = {0.13f, 0.16f, 0.20f};
 inline constexpr float kGroundLight[3] = {0.055f, 0.045f, 0.04f};
 inline constexpr float kEyeLight = 0.07f;
 inline constexpr float kShine = 0.12f;
+
+/// Show::kWire: what a base colour is multiplied by, so far (in pixels) from the nearest edge of a
+/// triangle whose least height is `height`: triangles too small for lines have none.
+inline float wireShade(float distance, float height) {
+    const float line = std::clamp(1.25f - distance, 0.0f, 1.0f);
+    return 1 - 0.8f * line * std::clamp((height - 2) / 6, 0.0f, 1.0f);
+}
 
 /// Linear light of an sRGB value in [0, 1], which is clamped, or of a byte; the byte nearest to a
 /// linear value, within a fifth of a step: srgbFromLinear(linearFromSrgb(byte)) == byte.

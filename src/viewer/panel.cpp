@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include <iterator>
+
 #include "base/text.h"
 
 namespace pietra {
@@ -18,8 +20,9 @@ constexpr const char* kHelp =
     "F               show the whole\n"
     "T               turntable or trackball\n"
     "[ ]             tolerance\n"
-    "1 to 8          shaded, normals, depth, level, patches,\n"
-    "                triangles, error, colours\n"
+    "1 to 9          shaded, normals, depth, level, patches,\n"
+    "                triangles, error, colours, edges\n"
+    "W               the triangles' edges\n"
     "A               1 or 4 samples a pixel\n"
     "L + drag        move the light\n"
     "Z               freeze what is selected, and where from\n"
@@ -56,11 +59,11 @@ void drawSettings(ViewState& state, const CameraControl& control) {
     if (ImGui::SliderFloat("tolerance", &pixels, 0.25f, 16, "%.2f px",
                            ImGuiSliderFlags_Logarithmic))
         state.pixels = double(pixels);
-    static constexpr const char* kShows[] = {"shaded",  "normals",   "depth", "level",
-                                             "patches", "triangles", "error", "colours"};
+    static constexpr const char* kShows[] = {"shaded",    "normals", "depth",   "level", "patches",
+                                             "triangles", "error",   "colours", "edges"};
     int show = int(state.show);
     ImGui::SetNextItemWidth(150);
-    if (ImGui::Combo("show", &show, kShows, 8)) state.show = Show(show);
+    if (ImGui::Combo("show", &show, kShows, int(std::size(kShows)))) state.show = Show(show);
     bool four = state.samples == 4;
     if (ImGui::Checkbox("4 samples a pixel", &four)) state.samples = four ? 4 : 1;
     ImGui::Checkbox("prefetch", &state.prefetch);

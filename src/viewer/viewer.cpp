@@ -300,7 +300,7 @@ void Viewer::setPixels(double pixels) {
 
 void Viewer::handleKey(SDL_Keycode key) {
     touch();
-    if (key >= SDLK_1 && key <= SDLK_8) state_.show = Show(key - SDLK_1);
+    if (key >= SDLK_1 && key <= SDLK_9) state_.show = Show(key - SDLK_1);
     switch (key) {
         case SDLK_ESCAPE:
             quit_ = true;
@@ -327,6 +327,9 @@ void Viewer::handleKey(SDL_Keycode key) {
             break;
         case SDLK_l:
             light_key_ = true;
+            break;
+        case SDLK_w:
+            state_.show = state_.show == Show::kWire ? Show::kShaded : Show::kWire;
             break;
         case SDLK_b:
             state_.spheres = ShowSpheres((int(state_.spheres) + 1) % 3);

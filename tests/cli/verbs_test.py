@@ -246,11 +246,11 @@ class Shown(VerbTest):
 
     def test_every_view_of_the_attributes(self):
         pictures = set()
-        for show in ("shaded", "normals", "depth", "lod", "patches", "triangles", "error", "colour",
+        for show in ("shaded", "normals", "depth", "lod", "patches", "triangles", "wire", "error", "colour",
                      "scalar:height"):
             self.render(f"{show}.png", "--show", show, "--pixels", "4", models=["terrain.pietra"])
             pictures.add(self.read(f"{show}.png"))
-        self.assertEqual(len(pictures), 9)
+        self.assertEqual(len(pictures), 10)
 
     def test_opengl_draws_the_same(self):
         run = self.run_pietra("render", "statue.pietra", "-o", "gl.png", "--size", "200x160",

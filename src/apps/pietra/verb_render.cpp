@@ -30,7 +30,7 @@ using Json = nlohmann::ordered_json;
 const std::pair<const char*, Show> kShows[] = {
     {"shaded", Show::kShaded}, {"normals", Show::kNormals}, {"depth", Show::kDepth},
     {"lod", Show::kLod},       {"patches", Show::kPatches}, {"triangles", Show::kTriangles},
-    {"error", Show::kError},   {"colour", Show::kColour},
+    {"wire", Show::kWire},     {"error", Show::kError},     {"colour", Show::kColour},
 };
 
 class RenderVerb : public Verb {
@@ -89,6 +89,7 @@ VerbText RenderVerb::text() const {
              {"lod", "the level of detail"},
              {"patches", "the pieces that are loaded and drawn as one"},
              {"triangles", "each triangle in a colour of its own"},
+             {"wire", "the triangles' edges as lines"},
              {"error",
               "how far the stated error may show, from blue for none to red for --pixels (or "
               "for the largest there is, with --pixels 0)"},

@@ -18,6 +18,8 @@ constexpr const char* kLookDefines[kLooks] = {
     "#define BASE PATCH_COLOUR\n#define LIGHT UNLIT\n",
     "#define BASE VERTEX_COLOUR\n#define LIGHT UNLIT\n",
     "#define BASE PATCH_COLOUR\n#define LIGHT NORMALS\n",
+    "#define BASE PATCH_COLOUR\n#define LIGHT LIT\n#define WIRE\n",
+    "#define BASE VERTEX_COLOUR\n#define LIGHT LIT\n#define WIRE\n",
 };
 
 std::string lightDefines() {
@@ -42,6 +44,8 @@ Look lookOf(Show show, const VertexLayout& layout) {
             return layout.scalars > 0 ? Look::kLitScalar : Look::kLit;
         case Show::kTriangles:
             return Look::kLitTriangles;
+        case Show::kWire:
+            return layout.colours ? Look::kWireColours : Look::kWire;
         case Show::kNormals:
             return Look::kNormals;
         case Show::kDepth:
@@ -56,11 +60,17 @@ Look lookOf(Show show, const VertexLayout& layout) {
 
 std::array<GlProgram, kLooks> makeDrawPrograms(int samples) {
     std::array<GlProgram, kLooks> programs;
-    for (size_t i = 0; i < kLooks; ++i)
-        programs[i] = makeProgram(
-            {{GL_VERTEX_SHADER, {"frame_block.glsl", "srgb.glsl", "patch_draw.vert.glsl"}},
-             {GL_FRAGMENT_SHADER, {"frame_block.glsl", "srgb.glsl", "patch_draw.frag.glsl"}}},
-            fmt::format("{}#define SAMPLES {}\n{}", kLookDefines[i], samples, lightDefines()));
+    const GlStage vertex{GL_VERTEX_SHADER,
+                         {"frame_block.glsl", "srgb.glsl", "patch_draw.vert.glsl"}};
+    const GlStage wire{GL_GEOMETRY_SHADER, {"frame_block.glsl", "patch_wire.geom.glsl"}};
+    const GlStage fragment{GL_FRAGMENT_SHADER,
+                           {"frame_block.glsl", "srgb.glsl", "patch_draw.frag.glsl"}};
+    for (size_t i = 0; i < kLooks; ++i) {
+        const std::string defines =
+            fmt::format("{}#define SAMPLES {}\n{}", kLookDefines[i], samples, lightDefines());
+        programs[i] = Look(i) < Look::kWire ? makeProgram({vertex, fragment}, defines)
+                                            : makeProgram({vertex, wire, fragment}, defines);
+    }
     return programs;
 }
 

@@ -11,11 +11,26 @@
 namespace pietra {
 
 /// What a program is made for: where a surface's colour is from, and what becomes of it.
-enum class Look { kLit, kLitColours, kLitTriangles, kLitScalar, kFlat, kFlatColours, kNormals };
-inline constexpr size_t kLooks = 7;
+enum class Look {
+    kLit,
+    kLitColours,
+    kLitTriangles,
+    kLitScalar,
+    kFlat,
+    kFlatColours,
+    kNormals,
+    kWire,
+    kWireColours
+};
+inline constexpr size_t kLooks = 9;
 
 /// How a patch with such vertices looks in a view.
 Look lookOf(Show show, const VertexLayout& layout);
+
+/// Whether its programs read the vertices' colours.
+inline bool usesColours(Look look) {
+    return look == Look::kLitColours || look == Look::kFlatColours || look == Look::kWireColours;
+}
 
 /// By Look.
 std::array<GlProgram, kLooks> makeDrawPrograms(int samples);

@@ -251,8 +251,7 @@ void GlRenderer::State::bindGroup(const DrawGroup& group) {
         (used ? glEnableVertexArrayAttrib : glDisableVertexArrayAttrib)(vertex_array, attribute);
     };
     bind(kPosition, 0);
-    bindOptional(kColour, look == Look::kLitColours || look == Look::kFlatColours,
-                 VertexLayout::kColourOffset);
+    bindOptional(kColour, usesColours(look), VertexLayout::kColourOffset);
     bindOptional(kScalar, look == Look::kLitScalar,
                  group.layout.scalarOffset() + 4 * uint32_t(settings.scalar_index));
 }

@@ -164,7 +164,7 @@ TEST_F(GlRendererTest, DrawsWhatTheCpuDrawsInEveryView) {
         GlRenderer renderer(scene.size, samples, kVram);
         for (const Show show :
              {Show::kShaded, Show::kNormals, Show::kDepth, Show::kLod, Show::kPatches,
-              Show::kTriangles, Show::kError, Show::kColour, Show::kScalar}) {
+              Show::kTriangles, Show::kError, Show::kColour, Show::kScalar, Show::kWire}) {
             ShadeSettings settings;
             settings.show = show;
             settings.scalar_count = 2;

@@ -1,6 +1,8 @@
 #include "render/raster/pixel_shader.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 namespace pietra {
 
@@ -66,6 +68,7 @@ void PixelShader::gather(const BatchPatch& patch, std::span<const ShadeItem> ite
 bool PixelShader::baseIsPatchColour(const BatchPatch& patch) const {
     switch (settings_.show) {
         case Show::kTriangles:
+        case Show::kWire:
             return false;
         case Show::kScalar:
             return patch.mesh().scalar.empty();
@@ -91,9 +94,31 @@ Vec3f PixelShader::baseColour(const BatchPatch& patch, uint32_t triangle,
         const float range = settings_.scalar_max - settings_.scalar_min;
         return scalarColour(range > 0 ? (value - settings_.scalar_min) / range : 0);
     }
+    if (mesh.colour.empty()) return patch.colour;
     Vec3f linear(0, 0, 0);
     for (int k = 0; k < 3; ++k) linear += weight[k] * linearFromSrgb(mesh.colour[index[k]]);
-    return settings_.show == Show::kShaded ? patch.colour * linear : linear;
+    return settings_.show == Show::kColour ? linear : patch.colour * linear;
+}
+
+/// wireShade() at the pixel's centre; no line where a corner has no image.
+float PixelShader::edgeLine(const ShadeLanes& lanes, size_t i) const {
+    if (lanes.any_given && lanes.given[i]) return 1;
+    constexpr float kUnit = 1.0f / kSubpixel;
+    const glm::vec2 centre(float(lanes.place[i] & kPlaceMask) + 0.5f,
+                           float(lanes.place[i] >> kPlaceBits & kPlaceMask) + 0.5f);
+    glm::vec2 corner[3];
+    for (int k = 0; k < 3; ++k)
+        corner[k] = kUnit * glm::vec2(float(lanes.corner[k][i].x), float(lanes.corner[k][i].y));
+    const auto cross = [](const glm::vec2& a, const glm::vec2& b) { return a.x * b.y - a.y * b.x; };
+    const float area = std::abs(cross(corner[1] - corner[0], corner[2] - corner[0]));
+    float distance = std::numeric_limits<float>::max(), height = distance;
+    for (int k = 0; k < 3; ++k) {
+        const glm::vec2 edge = corner[(k + 1) % 3] - corner[k];
+        const float length = std::max(glm::length(edge), kUnit);
+        distance = std::min(distance, std::abs(cross(edge, centre - corner[k])) / length);
+        height = std::min(height, area / length);
+    }
+    return wireShade(distance, height);
 }
 
 void PixelShader::compute(const BatchPatch& patch, std::span<const ShadeItem> items,
@@ -104,7 +129,8 @@ void PixelShader::compute(const BatchPatch& patch, std::span<const ShadeItem> it
             const uint32_t triangle = items[std::min(i, items.size() - 1)].triangle;
             const Vec3f base = baseColour(
                 patch, triangle, {lanes.weight[0][i], lanes.weight[1][i], lanes.weight[2][i]});
-            for (int c = 0; c < 3; ++c) lanes.base[c][i] = base[c];
+            const float line = settings_.show == Show::kWire ? edgeLine(lanes, i) : 1;
+            for (int c = 0; c < 3; ++c) lanes.base[c][i] = line * base[c];
         }
     }
     if (settings_.show == Show::kNormals)

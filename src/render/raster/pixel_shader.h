@@ -61,6 +61,7 @@ private:
     void giveWeights(const BatchPatch& patch, const ShadeItem& item, size_t lane,
                      ShadeLanes& lanes) const;
     Vec3f baseColour(const BatchPatch& patch, uint32_t triangle, const Vec3f& weight) const;
+    float edgeLine(const ShadeLanes& lanes, size_t i) const;
     Rgba8 colour(const ShadeLanes& lanes, size_t i) const {
         const uint32_t bytes = bytes_[lanes.lit[0][i]] | uint32_t(bytes_[lanes.lit[1][i]]) << 8 |
                                uint32_t(bytes_[lanes.lit[2][i]]) << 16 | 0xff000000u;

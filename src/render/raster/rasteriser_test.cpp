@@ -440,8 +440,9 @@ TEST(Picture, ViewsShowWhatTheyName) {
     for (size_t i = 0; i < scene.meshes[0].vertexCount(); ++i)
         scene.meshes[0].scalar[2 * i + 1] = float(scene.meshes[0].position[i].x);
     std::vector<Picture> seen;
-    for (const Show show : {Show::kShaded, Show::kNormals, Show::kDepth, Show::kLod, Show::kPatches,
-                            Show::kTriangles, Show::kError, Show::kColour, Show::kScalar}) {
+    for (const Show show :
+         {Show::kShaded, Show::kNormals, Show::kDepth, Show::kLod, Show::kPatches, Show::kTriangles,
+          Show::kError, Show::kColour, Show::kScalar, Show::kWire}) {
         ShadeSettings settings;
         settings.show = show;
         settings.scalar_count = 2;

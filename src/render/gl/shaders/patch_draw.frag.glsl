@@ -3,6 +3,13 @@
 //
 // Each view has a program of its own: llvmpipe computes what a branch leaves out, too.
 
+#ifdef WIRE
+noperspective in vec3 edge_distance;  // in pixels
+flat in float least_height;
+#define view_normal wire_normal
+#define patch_words wire_words
+#define vertex_value wire_value
+#endif
 in vec3 view_normal;
 flat in uvec4 patch_words;
 #ifdef HAS_VERTEX_VALUE
@@ -111,7 +118,14 @@ void main() {
 #if LIGHT == NORMALS
     colour = vec4(linearFromSrgb(n * 0.5 + 0.5), 1.0);
 #else
-    colour = vec4(lit(n, eye, baseColour()), 1.0);
+    vec3 base = baseColour();
+#ifdef WIRE
+    // wireShade() of shading.h.
+    float nearest = min(min(edge_distance.x, edge_distance.y), edge_distance.z);
+    float line = clamp(1.25 - abs(nearest), 0.0, 1.0);
+    base *= 1.0 - 0.8 * line * clamp((least_height - 2.0) / 6.0, 0.0, 1.0);
+#endif
+    colour = vec4(lit(n, eye, base), 1.0);
 #endif
 #endif
 }
