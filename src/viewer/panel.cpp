@@ -46,6 +46,8 @@ void drawFigures(const FrameFigures& figures) {
     text(fmt::format("{:.1f} ms a frame, drawing {:.1f} ms", last, figures.draw_ms));
     text(fmt::format("{} triangles in {} patches", formatCount(double(figures.triangles)),
                      figures.patches));
+    ImGui::PlotLines("##memory", figures.megabytes.data(), FrameFigures::kHistory, figures.next,
+                     nullptr, 0, float(figures.ram_bytes) / (1 << 20), ImVec2(250, 25));
     text(fmt::format("memory {} of {}", formatBytes(figures.resident_bytes),
                      formatBytes(figures.ram_bytes)));
     text(fmt::format("read {}", formatBytes(figures.bytes_read)));

@@ -32,7 +32,7 @@ struct ViewState {
 /// Of the last frames.
 struct FrameFigures {
     static constexpr int kHistory = 120;
-    std::array<float, kHistory> ms{};
+    std::array<float, kHistory> ms{}, megabytes{};
     int next = 0;
     double draw_ms = 0;
     double tolerance_px = 0;
@@ -43,6 +43,7 @@ struct FrameFigures {
 
     void add(float frame_ms) {
         ms[size_t(next)] = frame_ms;
+        megabytes[size_t(next)] = float(resident_bytes) / (1 << 20);
         next = (next + 1) % kHistory;
     }
 };
