@@ -31,7 +31,7 @@ struct FrameRequest {
     PictureSize size;
     double pixels = 1;   ///< tolerance
     double seconds = 0;  ///< since the beginning, for the prediction of where the camera goes
-    Culling culling{true, true, true};
+    Culling culling{true, true, true, true};
     bool prefetch = true;
     bool show_error = false;  ///< DrawPatch::value is the error in pixels, not the level
 };

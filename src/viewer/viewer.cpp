@@ -505,10 +505,11 @@ void Viewer::drawScene() {
     else
         rasteriser_->restart(first, first_lattice, shade());
     rasteriser_samples_ = state_.samples;
-    for (size_t m = 0; m < models_.size(); ++m) {
-        rasteriser_->setModel(View(control_.camera(), size, lattice(m)), lattice(m));
-        rasteriser_->draw(frame.models[m].patches);
-    }
+    std::vector<ModelPatches> list;
+    for (size_t m = 0; m < models_.size(); ++m)
+        list.push_back(
+            {View(control_.camera(), size, lattice(m)), &lattice(m), frame.models[m].patches});
+    rasteriser_->draw(list, request.culling.occlusion);
     picture_ = &rasteriser_->finish();
     figures_.draw_ms = 1e3 * secondsSince(start);
     figures_.tolerance_px = frame.tolerance_px;

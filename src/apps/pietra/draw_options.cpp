@@ -8,7 +8,7 @@ void CullOption::declare(OptionSet& options, const char* help) {
 
 Culling CullOption::culling() const {
     const bool all = word_ == "all";
-    return {all || word_ == "frustum", all || word_ == "cone", all};
+    return {all || word_ == "frustum", all || word_ == "cone", all, all || word_ == "occlusion"};
 }
 
 }  // namespace pietra

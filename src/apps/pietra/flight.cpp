@@ -93,10 +93,10 @@ private:
             rasteriser_.emplace(frame.models[0].view, lattice(0), settings_.samples, shade);
         else
             rasteriser_->restart(frame.models[0].view, lattice(0), shade);
-        for (size_t m = 0; m < frame.models.size(); ++m) {
-            rasteriser_->setModel(frame.models[m].view, lattice(m));
-            rasteriser_->draw(frame.models[m].patches);
-        }
+        std::vector<ModelPatches> list;
+        for (size_t m = 0; m < frame.models.size(); ++m)
+            list.push_back({frame.models[m].view, &lattice(m), frame.models[m].patches});
+        rasteriser_->draw(list, settings_.culling.occlusion);
         rasteriser_->finish();
         return msSince(start);
     }

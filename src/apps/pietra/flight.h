@@ -14,7 +14,7 @@ struct FlightSettings {
     int frames = 0;  ///< at least 1
     PictureSize size;
     double pixels = 1;
-    Culling culling{true, true, true};
+    Culling culling{true, true, true, true};
     bool prefetch = true;
     int samples = 1;
     bool draw = true;

@@ -113,8 +113,8 @@ void RenderVerb::declare(OptionSet& options) {
     options.choice("--samples", samples_, {"1", "4"}, "Coverage samples a pixel.");
     cull_.declare(options,
                   "What is left out: what lies outside the picture; closed parts that face away; "
-                  "what is hidden, which a single picture cannot know before it is drawn; or all "
-                  "of these and what is smaller than half the tolerance.");
+                  "what is hidden, which --renderer gl cannot know in a single picture; or all of "
+                  "these and what is smaller than half the tolerance.");
     options.flag("--two-sided", two_sided_, "Draw and light closed parts from both sides, too.");
     options.custom("--light", "X,Y,Z", "-0.45,0.65,0.6",
                    "Towards the light: to the right, up, towards the viewer.",

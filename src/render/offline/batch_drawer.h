@@ -15,6 +15,7 @@ namespace pietra {
 struct DrawerSettings {
     int samples = 1;
     ShadeSettings shade;
+    bool leave_out_hidden = false;
     size_t batch_bytes = 0;  ///< of what is kept of pages that have been handed over
 };
 
@@ -28,7 +29,8 @@ struct DrawerStatistics {
 class BatchDrawer {
 public:
     virtual ~BatchDrawer() = default;
-    /// Of what comes from now on. The view is the same camera throughout.
+    /// Of what comes from now on. The view is the same camera throughout; lattices must outlive
+    /// this.
     virtual void setModel(const View& view, const Lattice& lattice) = 0;
     /// A page's patches, `list` in their order: list[i].mesh is patches.data() + i. Called by one
     /// thread at a time, but by any.

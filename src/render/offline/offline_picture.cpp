@@ -70,8 +70,9 @@ public:
         planMemory();
         progress_.beginStage("draw", patches);
         const auto make = onGpu() ? makeGlDrawer : makeRasterDrawer;
-        const auto drawer = make(models_[0].view, models_[0].reader->info().lattice,
-                                 {settings_.samples, settings_.shade, batch_bytes_});
+        const auto drawer =
+            make(models_[0].view, models_[0].reader->info().lattice,
+                 {settings_.samples, settings_.shade, settings_.culling.occlusion, batch_bytes_});
         for (uint32_t m = 0; m < models_.size(); ++m) drawModel(m, *drawer);
         result_.picture = drawer->finish();
         progress_.endStage();

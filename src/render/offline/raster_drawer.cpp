@@ -19,11 +19,12 @@ class RasterDrawer : public BatchDrawer {
 public:
     RasterDrawer(const View& view, const Lattice& lattice, const DrawerSettings& settings)
         : batch_bytes_(settings.batch_bytes),
-          rasteriser_(view, lattice, settings.samples, settings.shade) {}
+          leave_out_hidden_(settings.leave_out_hidden),
+          rasteriser_(view, lattice, settings.samples, settings.shade),
+          models_{{{view, &lattice, {}}, 0}} {}
 
     void setModel(const View& view, const Lattice& lattice) override {
-        drawBatch();
-        rasteriser_.setModel(view, lattice);
+        models_.push_back({{view, &lattice, {}}, list_.size()});
     }
 
     void add(std::vector<Mesh> patches, std::vector<DrawPatch> list) override {
@@ -46,17 +47,33 @@ public:
 
 private:
     void drawBatch() {
-        rasteriser_.draw(list_);
+        std::vector<ModelPatches> models;
+        for (size_t m = 0; m < models_.size(); ++m) {
+            const size_t end = m + 1 < models_.size() ? models_[m + 1].first : list_.size();
+            models.push_back(models_[m].part);
+            models.back().patches =
+                std::span(list_).subspan(models_[m].first, end - models_[m].first);
+        }
+        rasteriser_.draw(models, leave_out_hidden_);
         statistics_.held_bytes = std::max(statistics_.held_bytes, bytes_);
+        models_.erase(models_.begin(), models_.end() - 1);
+        models_[0].first = 0;
         list_.clear();
         meshes_.clear();
         bytes_ = 0;
     }
 
+    struct Model {
+        ModelPatches part;
+        size_t first;  ///< of list_
+    };
+
     const size_t batch_bytes_;
+    const bool leave_out_hidden_;
     Rasteriser rasteriser_;
     std::vector<std::vector<Mesh>> meshes_;
     std::vector<DrawPatch> list_;
+    std::vector<Model> models_;  // the last is the one that is set
     size_t bytes_ = 0;
 };
 

@@ -9,6 +9,7 @@
 #include "render/raster/batch.h"
 #include "render/raster/clip.h"
 #include "render/raster/coverage.h"
+#include "render/raster/farthest_depths.h"
 #include "render/raster/finish_picture.h"
 #include "render/raster/pixel_shader.h"
 #include "render/raster/resolve.h"
@@ -44,8 +45,7 @@ private:
 }  // namespace
 
 struct Rasteriser::State {
-    View view;
-    Projection projection;
+    BatchModel model;  // of what is drawn now
     ShadeSettings settings;
     int samples;
     std::vector<VisibilityKey> key;
@@ -53,27 +53,33 @@ struct Rasteriser::State {
     std::vector<Rgba8> sample_colour;  // with 4 samples; with 1 it is the picture's
     Picture picture;
     Batch batch;
+    std::vector<uint8_t> drawn;  // a patch of the batch: not left out, set by any thread
     RasterStatistics statistics;
 
     State(const View& v, const Lattice& lattice, int sample_count, const ShadeSettings& s)
-        : view(v), projection(v, lattice), settings(s), samples(sample_count) {
+        : model{v, Projection(v, lattice)}, settings(s), samples(sample_count) {
         CHECK(samples == 1 || samples == 4);
     }
     void begin();
     PixelBox screen() const { return {0, 0, picture.size.width, picture.size.height}; }
     void checkScalars(const Mesh& mesh) const;
-    void layOut(std::span<const DrawPatch> patches);
+    void beginBatch();
+    void append(std::span<const DrawPatch> patches);
+    void drawBatch(bool leave_out_hidden);
+    void layOutVertices();
     void transform(BatchPatch& patch) const;
     std::vector<DrawChunk> makeChunks() const;
-    PixelBox boxOf(const DrawChunk& chunk) const;
+    void fit(DrawChunk& chunk) const;
     void drawChunk(const DrawChunk& chunk, const VisibilityTile& tile) const;
-    void drawTiles(const std::vector<DrawChunk>& chunks);
+    void drawUnhidden(const std::vector<DrawChunk>& chunks, const VisibilityTile& tile,
+                      std::vector<uint32_t>& list);
+    void drawTiles(const std::vector<DrawChunk>& chunks, bool leave_out_hidden);
 };
 
 void Rasteriser::State::begin() {
-    picture.size = view.size();
+    picture.size = model.view.size();
     CHECK_LE(std::max(picture.size.width, picture.size.height), kMaxPictureSide);
-    picture.focal_px = view.focal_px();
+    picture.focal_px = model.view.focal_px();
     const size_t pixels = picture.pixelCount();
     picture.colour.resize(pixels);
     picture.depth.resize(pixels);
@@ -90,37 +96,61 @@ void Rasteriser::State::checkScalars(const Mesh& mesh) const {
     CHECK_LT(settings.scalar_index, settings.scalar_count);
 }
 
-void Rasteriser::State::layOut(std::span<const DrawPatch> patches) {
+void Rasteriser::State::beginBatch() {
+    CHECK(!finished);
+    batch.model.clear();
     batch.patch.clear();
-    size_t vertices = 0, number = 0;
+    batch.triangles = 0;
+}
+
+void Rasteriser::State::append(std::span<const DrawPatch> patches) {
     for (const DrawPatch& patch : patches) {
         checkScalars(*patch.mesh);
-        vertices += patch.mesh->vertexCount();
-    }
-    batch.vertex.resize(vertices);
-    vertices = 0;
-    for (const DrawPatch& patch : patches) {
         BatchPatch entry;
         entry.patch = &patch;
-        entry.vertex = batch.vertex.data() + vertices;
-        entry.first_number = uint32_t(number);
+        entry.model = uint32_t(batch.model.size());
+        entry.first_number = uint32_t(batch.triangles);
         entry.both_sides = settings.two_sided || !patch.one_sided;
         entry.colour = patchColour(settings, patch);
         batch.patch.push_back(entry);
-        vertices += patch.mesh->vertexCount();
-        number += patch.mesh->triangleCount();
+        batch.triangles += patch.mesh->triangleCount();
     }
-    CHECK_LT(number, size_t(kMaxTriangleNumber));
-    statistics.triangles += number;
-    statistics.patches += patches.size();
+    batch.model.push_back(model);
+    CHECK_LT(batch.triangles, size_t(kMaxTriangleNumber));
+}
+
+void Rasteriser::State::layOutVertices() {
+    size_t vertices = 0;
+    for (const BatchPatch& patch : batch.patch) vertices += patch.mesh().vertexCount();
+    batch.vertex.resize(vertices);
+    ScreenVertex* vertex = batch.vertex.data();
+    for (BatchPatch& patch : batch.patch) {
+        patch.vertex = vertex;
+        vertex += patch.mesh().vertexCount();
+    }
+}
+
+void Rasteriser::State::drawBatch(bool leave_out_hidden) {
+    Stopwatch watch;
+    layOutVertices();
+    parallelFor(batch.patch.size(), [&](size_t i) { transform(batch.patch[i]); });
+    const std::vector<DrawChunk> chunks = makeChunks();
+    drawn.assign(batch.patch.size(), !leave_out_hidden);
+    statistics.transform_ms += watch.ms();
+    drawTiles(chunks, leave_out_hidden);
+    statistics.triangles += batch.triangles;
+    statistics.patches += batch.patch.size();
+    for (size_t i = 0; i < drawn.size(); ++i)
+        if (!drawn[i]) statistics.triangles_hidden += batch.patch[i].mesh().triangleCount();
 }
 
 void Rasteriser::State::transform(BatchPatch& entry) const {
     const Mesh& mesh = entry.mesh();
     CHECK_EQ(mesh.normal.size(), mesh.position.size());
-    const ImageBounds bounds =
-        transformVertices(projection, mesh.position, mesh.normal, entry.vertex);
+    const ImageBounds bounds = transformVertices(batch.model[entry.model].projection, mesh.position,
+                                                 mesh.normal, entry.vertex);
     entry.whole = bounds.whole;
+    entry.nearest = bounds.whole ? bounds.nearest : std::numeric_limits<float>::infinity();
     entry.box = bounds.behind ? PixelBox{} : screen();
     if (entry.whole)
         entry.box = entry.box.intersected(
@@ -128,21 +158,25 @@ void Rasteriser::State::transform(BatchPatch& entry) const {
              (bounds.max_x >> kSubpixelBits) + 1, (bounds.max_y >> kSubpixelBits) + 1});
 }
 
-PixelBox Rasteriser::State::boxOf(const DrawChunk& chunk) const {
+/// To the images of its own vertices.
+void Rasteriser::State::fit(DrawChunk& chunk) const {
     int32_t min_x = std::numeric_limits<int32_t>::max(),
             max_x = std::numeric_limits<int32_t>::lowest();
     int32_t min_y = min_x, max_y = max_x;
+    float nearest = 0;
     for (uint32_t i = 0; i < chunk.count; ++i)
         for (const uint32_t index : chunk.patch->triangle()[chunk.first + i]) {
             const ScreenVertex& v = chunk.patch->vertex[index];
-            if (v.x == kNoImage) return screen();
+            if (v.x == kNoImage) return;
             min_x = std::min(min_x, v.x);
             max_x = std::max(max_x, v.x);
             min_y = std::min(min_y, v.y);
             max_y = std::max(max_y, v.y);
+            nearest = std::max(nearest, v.inv_depth);
         }
-    return screen().intersected({min_x >> kSubpixelBits, min_y >> kSubpixelBits,
-                                 (max_x >> kSubpixelBits) + 1, (max_y >> kSubpixelBits) + 1});
+    chunk.box = screen().intersected({min_x >> kSubpixelBits, min_y >> kSubpixelBits,
+                                      (max_x >> kSubpixelBits) + 1, (max_y >> kSubpixelBits) + 1});
+    chunk.nearest = nearest;
 }
 
 std::vector<DrawChunk> Rasteriser::State::makeChunks() const {
@@ -152,13 +186,12 @@ std::vector<DrawChunk> Rasteriser::State::makeChunks() const {
         if (patch.box.empty()) continue;
         const size_t step = triangles <= 2 * kChunkTriangles ? triangles : kChunkTriangles;
         for (size_t first = 0; first < triangles; first += step)
-            chunks.push_back(
-                {&patch, uint32_t(first), uint32_t(std::min(step, triangles - first)), patch.box});
+            chunks.push_back({&patch, uint32_t(first), uint32_t(std::min(step, triangles - first)),
+                              patch.box, patch.nearest});
     }
     parallelForSlices(chunks.size(), 16, [&](size_t begin, size_t end) {
         for (size_t i = begin; i < end; ++i)
-            if (chunks[i].count < chunks[i].patch->mesh().triangleCount())
-                chunks[i].box = boxOf(chunks[i]);
+            if (chunks[i].count < chunks[i].patch->mesh().triangleCount()) fit(chunks[i]);
     });
     std::erase_if(chunks, [](const DrawChunk& chunk) { return chunk.box.empty(); });
     return chunks;
@@ -181,28 +214,51 @@ void Rasteriser::State::drawChunk(const DrawChunk& chunk, const VisibilityTile& 
     for (const uint32_t i : clipped) {
         const Triangle& t = patch.triangle()[chunk.first + i];
         const std::vector<Vec3i>& position = patch.mesh().position;
-        const ScreenPolygon p =
-            clipTriangle(projection, {position[t[0]], position[t[1]], position[t[2]]});
+        const ScreenPolygon p = clipTriangle(batch.model[patch.model].projection,
+                                             {position[t[0]], position[t[1]], position[t[2]]});
         for (int k = 2; k < p.count; ++k)
             drawTriangle(tile, {p.point[0], p.point[k - 1], p.point[k]}, patch.both_sides,
                          chunk.firstNumber() + i);
     }
 }
 
-void Rasteriser::State::drawTiles(const std::vector<DrawChunk>& chunks) {
-    const std::vector<DrawTile> tiles =
-        makeTiles(chunks, screen(), kTilesPerThread * threadCount());
-    const PixelShader shader(view, projection, settings);
+/// The nearest first, those that are not hidden by then. What is left out is taken from `list`.
+void Rasteriser::State::drawUnhidden(const std::vector<DrawChunk>& chunks,
+                                     const VisibilityTile& tile, std::vector<uint32_t>& list) {
+    std::sort(list.begin(), list.end(),
+              [&](uint32_t a, uint32_t b) { return chunks[a].nearest > chunks[b].nearest; });
+    FarthestDepths farthest(tile);
+    auto kept = list.begin();
+    for (const uint32_t i : list) {
+        const DrawChunk& chunk = chunks[i];
+        const PixelBox box = chunk.box.intersected(tile.box);
+        if (farthest.hide(box, chunk.nearest)) continue;
+        drawChunk(chunk, tile);
+        farthest.changed(box);
+        const auto patch = size_t(chunk.patch - batch.patch.data());
+        std::atomic_ref(drawn[patch]).store(1, std::memory_order_relaxed);
+        *kept++ = i;
+    }
+    list.erase(kept, list.end());
+}
+
+void Rasteriser::State::drawTiles(const std::vector<DrawChunk>& chunks, bool leave_out_hidden) {
+    std::vector<DrawTile> tiles = makeTiles(chunks, screen(), kTilesPerThread * threadCount());
+    std::vector<PixelShader> shader;
+    for (const BatchModel& m : batch.model) shader.emplace_back(m.view, m.projection, settings);
     Rgba8* colour = samples == 1 ? picture.colour.data() : sample_colour.data();
     std::atomic<int64_t> raster_ns{0}, shade_ns{0};
     Stopwatch watch;
     parallelFor(tiles.size(), [&](size_t i) {
         Stopwatch tile_watch;
         const VisibilityTile tile{key.data(), picture.size.width, samples, tiles[i].box};
-        for (const uint32_t chunk : tiles[i].chunk) drawChunk(chunks[chunk], tile);
+        if (leave_out_hidden)
+            drawUnhidden(chunks, tile, tiles[i].chunk);
+        else
+            for (const uint32_t chunk : tiles[i].chunk) drawChunk(chunks[chunk], tile);
         raster_ns += int64_t(tile_watch.ms() * 1e6);
         for (const uint32_t chunk : tiles[i].chunk)
-            resolveChunk(tile, chunks[chunk], shader, colour);
+            resolveChunk(tile, chunks[chunk], shader[chunks[chunk].patch->model], colour);
         shade_ns += int64_t(tile_watch.ms() * 1e6);
     });
     const double wall = watch.ms(), busy = double(raster_ns + shade_ns);
@@ -219,28 +275,30 @@ Rasteriser::Rasteriser(const View& view, const Lattice& lattice, int samples,
 Rasteriser::~Rasteriser() = default;
 
 void Rasteriser::restart(const View& view, const Lattice& lattice, const ShadeSettings& settings) {
-    state_->view = view;
-    state_->projection = Projection(view, lattice);
+    state_->model = {view, Projection(view, lattice)};
     state_->settings = settings;
     state_->begin();
 }
 
 void Rasteriser::setModel(const View& view, const Lattice& lattice) {
-    CHECK(view.size().width == state_->view.size().width &&
-          view.size().height == state_->view.size().height);
-    state_->view = view;
-    state_->projection = Projection(view, lattice);
+    CHECK(view.size().width == state_->picture.size.width &&
+          view.size().height == state_->picture.size.height);
+    state_->model = {view, Projection(view, lattice)};
 }
 
 void Rasteriser::draw(std::span<const DrawPatch> patches) {
-    State& s = *state_;
-    CHECK(!s.finished);
-    Stopwatch watch;
-    s.layOut(patches);
-    parallelFor(s.batch.patch.size(), [&](size_t i) { s.transform(s.batch.patch[i]); });
-    const std::vector<DrawChunk> chunks = s.makeChunks();
-    s.statistics.transform_ms += watch.ms();
-    s.drawTiles(chunks);
+    state_->beginBatch();
+    state_->append(patches);
+    state_->drawBatch(false);
+}
+
+void Rasteriser::draw(std::span<const ModelPatches> models, bool leave_out_hidden) {
+    state_->beginBatch();
+    for (const ModelPatches& m : models) {
+        setModel(m.view, *m.lattice);
+        state_->append(m.patches);
+    }
+    state_->drawBatch(leave_out_hidden);
 }
 
 const Picture& Rasteriser::finish() {

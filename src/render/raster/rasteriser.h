@@ -10,8 +10,8 @@
 // within kNearDepth lattice units of the eye, shared edges at the same point from both sides. Of
 // equal depths the triangle drawn first wins.
 //
-// Determinism: the picture does not depend on the number of threads, the SIMD level, or how the
-// draw list was cut into calls of draw().
+// Determinism: the picture does not depend on the number of threads, the SIMD level, how the draw
+// list was cut into calls, or whether what is hidden was left out.
 //
 // Memory: 16 bytes a pixel (56 with 4 samples), and 16 a vertex of the largest draw().
 // Not thread-safe: one thread calls, many work.
@@ -21,17 +21,18 @@
 #include <span>
 
 #include "geometry/lattice.h"
-#include "multires/view.h"
 #include "multires/draw_list.h"
+#include "multires/view.h"
 #include "render/picture.h"
 #include "render/shading.h"
 
 namespace pietra {
 
 struct RasterStatistics {
-    uint64_t patches = 0;         ///< drawn
-    uint64_t triangles = 0;       ///< in them
-    uint64_t pixels_covered = 0;  ///< with anything in them; set by finish()
+    uint64_t patches = 0;           ///< drawn
+    uint64_t triangles = 0;         ///< in them
+    uint64_t triangles_hidden = 0;  ///< of these, left out; depends on the number of threads
+    uint64_t pixels_covered = 0;    ///< with anything in them; set by finish()
     /// Wall clock. Rasterising and shading run in one parallel loop, whose time is split as the
     /// threads spent it.
     double transform_ms = 0, raster_ms = 0, shade_ms = 0, finish_ms = 0;
@@ -40,6 +41,13 @@ struct RasterStatistics {
 
 /// Longest side of a picture, in pixels.
 inline constexpr int kMaxPictureSide = 1 << 14;
+
+/// What is drawn of one model of a scene. `view` and `lattice` as for Rasteriser::setModel().
+struct ModelPatches {
+    View view;
+    const Lattice* lattice;
+    std::span<const DrawPatch> patches;
+};
 
 class Rasteriser {
 public:
@@ -59,6 +67,10 @@ public:
     /// Draws, and shades what is visible so far: the meshes may vanish afterwards. At most 2^32 - 2
     /// triangles a call.
     void draw(std::span<const DrawPatch> patches);
+    /// Draws the models, not empty, as one after the other; the last one stays set. Patches that
+    /// are hidden, by what is drawn already or by each other, may be left out: this changes no
+    /// pixel, and costs next to nothing where none are.
+    void draw(std::span<const ModelPatches> models, bool leave_out_hidden);
     /// Completes the picture, which is valid until restart(); nothing can be drawn in between.
     const Picture& finish();
 

@@ -17,7 +17,7 @@ std::vector<DrawChunk> randomChunks(std::mt19937& random, size_t count, int larg
         const PixelBox box = PixelBox{x, y, x + 1 + int32_t(random() % unsigned(largest)),
                                       y + 1 + int32_t(random() % unsigned(largest))}
                                  .intersected(kScreen);
-        chunks.push_back({nullptr, 0, uint32_t(1 + random() % 5000), box});
+        chunks.push_back({nullptr, 0, uint32_t(1 + random() % 5000), box, 0});
     }
     return chunks;
 }

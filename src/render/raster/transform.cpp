@@ -26,6 +26,7 @@ public:
         min_x_ = min_y_ = hn::Set(di, std::numeric_limits<int32_t>::max());
         max_x_ = max_y_ = hn::Set(di, std::numeric_limits<int32_t>::lowest());
         missing_ = in_front_ = hn::Zero(di);
+        nearest_ = hn::Zero(DF());
     }
 
     HWY_INLINE void run(const int32_t* position, const int32_t* normal, int32_t* out) {
@@ -63,6 +64,7 @@ public:
         min_y_ = hn::IfThenElse(keep, hn::Min(min_y_, fixed_y), min_y_);
         max_x_ = hn::IfThenElse(keep, hn::Max(max_x_, fixed_x), max_x_);
         max_y_ = hn::IfThenElse(keep, hn::Max(max_y_, fixed_y), max_y_);
+        nearest_ = hn::Max(nearest_, inv_depth);
         missing_ = hn::Or(missing_, hn::VecFromMask(di, hn::Not(keep)));
         in_front_ = hn::Or(in_front_, hn::VecFromMask(di, hn::RebindMask(di, in_front)));
     }
@@ -74,7 +76,8 @@ public:
                 hn::GetLane(hn::MinOfLanes(di, min_x_)),
                 hn::GetLane(hn::MinOfLanes(di, min_y_)),
                 hn::GetLane(hn::MaxOfLanes(di, max_x_)),
-                hn::GetLane(hn::MaxOfLanes(di, max_y_))};
+                hn::GetLane(hn::MaxOfLanes(di, max_y_)),
+                hn::GetLane(hn::MaxOfLanes(DF(), nearest_))};
     }
 
 private:
@@ -86,6 +89,7 @@ private:
 
     const Projection& p_;
     VI min_x_, min_y_, max_x_, max_y_, missing_, in_front_;
+    VF nearest_;
 };
 
 ImageBounds TransformVertices(const Projection& projection, const int32_t* position,

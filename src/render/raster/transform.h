@@ -13,6 +13,7 @@ struct ImageBounds {
     bool whole = true;                   ///< every vertex has an image
     bool behind = true;                  ///< no vertex is in front of the eye
     int32_t min_x, min_y, max_x, max_y;  ///< of the images, in 1/256 pixel; min > max without any
+    float nearest;                       ///< largest ScreenVertex::inv_depth of them, or 0
 };
 
 /// `normal` and `out` are as long as `position`.

@@ -1,0 +1,88 @@
+// Flies a path through models with the CPU rasteriser, all that a frame needs being loaded, and
+// draws each frame whole and without what is hidden, in turn; prints medians and their ratio.
+//
+//   bench_hidden PATH FRAMES SAMPLES MODEL...
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+
+#include "geometry/bounds.h"
+#include "render/raster/rasteriser.h"
+#include "runtime/scene.h"
+#include "runtime/standard_paths.h"
+
+using namespace pietra;
+
+namespace {
+
+constexpr PictureSize kSize{1280, 1024};
+
+double median(std::vector<double> values) {
+    std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
+    return values[values.size() / 2];
+}
+
+struct Way {
+    Rasteriser rasteriser;
+    bool leave_out_hidden;
+    std::vector<double> ms, triangles;
+
+    void draw(const std::vector<ModelPatches>& models) {
+        const auto start = std::chrono::steady_clock::now();
+        rasteriser.restart(models[0].view, *models[0].lattice, {});
+        rasteriser.draw(models, leave_out_hidden);
+        rasteriser.finish();
+        ms.push_back(
+            std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+                .count());
+        triangles.push_back(
+            double(rasteriser.statistics().triangles - rasteriser.statistics().triangles_hidden));
+    }
+};
+
+/// Centres of the finest nodes.
+std::vector<Vec3d> pointsOf(const std::vector<const ModelReader*>& models) {
+    std::vector<Vec3d> points;
+    for (const ModelReader* model : models)
+        for (const Node& node : model->nodes())
+            if (node.isLeaf())
+                points.push_back(model->info().lattice.toInput(Vec3i(node.bounds.centre)));
+    return points;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    if (argc < 5 || !parseStandardPath(argv[1])) return 2;
+    const int frames = std::atoi(argv[2]), samples = std::atoi(argv[3]);
+    std::vector<std::unique_ptr<ModelReader>> readers;
+    std::vector<const ModelReader*> models;
+    for (int i = 4; i < argc; ++i)
+        models.push_back(readers.emplace_back(std::make_unique<ModelReader>(argv[i])).get());
+    const CameraPath path =
+        standardPath(*parseStandardPath(argv[1]), pointsOf(models), UpAxis::kZ, kSize);
+    Scene scene(models, {size_t(2) << 30, 1});
+    const View any({}, kSize, {});
+    Way way[2] = {{Rasteriser(any, {}, samples, {}), false, {}, {}},
+                  {Rasteriser(any, {}, samples, {}), true, {}, {}}};
+    for (int i = 0; i < frames; ++i) {
+        FrameRequest request;
+        request.camera = path.frame(i, frames);
+        request.size = kSize;
+        request.prefetch = false;
+        std::vector<ModelPatches> list;
+        const Frame& frame = scene.converge(request);
+        for (size_t m = 0; m < models.size(); ++m)
+            list.push_back(
+                {frame.models[m].view, &models[m]->info().lattice, frame.models[m].patches});
+        for (int k = 0; k < 2; ++k) way[(i + k) % 2].draw(list);
+        if (way[0].rasteriser.finish().colour != way[1].rasteriser.finish().colour) return 1;
+    }
+    fmt::print(
+        "all {:.1f} ms, {:.0f} triangles; without hidden ones {:.1f} ms, {:.0f}; ratio {:.2f}\n",
+        median(way[0].ms), median(way[0].triangles), median(way[1].ms), median(way[1].triangles),
+        median(way[0].ms) / median(way[1].ms));
+}
