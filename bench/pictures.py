@@ -54,22 +54,23 @@ def main():
     rows, limit = [], options.pixels + 1
     for model in options.models:
         info = json.loads(common.pietra("info", model, "--json").stdout)
-        silhouette, edges, shade, faults = [], [], [], 0
+        silhouette, edges, hairlines, shade, faults = [], [], [], [], 0
         for camera in cameras(info["bounds"], options.views, options.seed):
             found = compare(model, camera, options, options.folder)
             silhouette.append(found["coverage_px"]["max"])
             edges.append(found["edge_px"]["max"])
+            hairlines.append(sum(found["hairlines"].values()))
             shade.append(found["shade"]["mean"])
             if max(silhouette[-1], edges[-1]) > limit:
                 faults += 1
                 print(f"{model}: silhouette {silhouette[-1]:.2f} px, depth edge {edges[-1]:.2f} px: "
                       f"{json.dumps(camera)}", flush=True)
         rows.append([pathlib.Path(model).stem, options.views, f"{max(silhouette):.2f}",
-                     f"{max(edges):.2f}", f"{common.median(shade):.2f}", faults])
+                     f"{max(edges):.2f}", max(hairlines), f"{common.median(shade):.2f}", faults])
         print(" | ".join(map(str, rows[-1])), flush=True)
     print(common.table(["model", "views", "largest silhouette distance, px",
-                        "largest depth edge distance, px", "median mean shade difference of 255",
-                        f"views beyond {limit:g} px"], rows))
+                        "largest depth edge distance, px", "most pixels of hairlines",
+                        "median mean shade difference of 255", f"views beyond {limit:g} px"], rows))
 
 
 if __name__ == "__main__":

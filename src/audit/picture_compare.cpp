@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -258,9 +259,44 @@ void compareCoverage(const Picture& a, const Picture& b, PictureDifference& resu
     result.coverage_px = spreadOf(distances);
 }
 
-void compareEdgesAndDepth(const Picture& a, const Picture& b, int supersampled,
+/// The farther side of a slit of at most `width` pixels, across or upright, that holds pixel
+/// (x, y): the nearest such; +inf without any.
+float sideOfSlit(const DepthField& depth, int x, int y, int width) {
+    float best = kNothing;
+    for (int before = 1; before <= width; ++before)
+        for (int after = 1; before + after - 1 <= width; ++after)
+            best = std::min({best, std::max(depth(x - before, y), depth(x + after, y)),
+                             std::max(depth(x, y - before), depth(x, y + after))});
+    return best;
+}
+
+/// The depths of `picture` without its hairlines, which `other` shows closed; counts their pixels.
+Picture closeHairlines(const Picture& picture, const Picture& other, int width, float step_px,
+                       uint64_t& hairlines) {
+    Picture closed{picture.size, {}, picture.depth, picture.focal_px};
+    const DepthField depth(picture);
+    std::atomic<uint64_t> count{0};
+    forEachRow(picture.size, [&](int y) {
+        for (int x = 0; x < picture.size.width; ++x) {
+            const size_t i = picture.index(x, y);
+            const float limit = 1 + step_px / depth.focal();
+            if (!(picture.depth[i] > other.depth[i] * limit)) continue;
+            const float side = sideOfSlit(depth, x, y, width);
+            if (!(picture.depth[i] > side * limit && other.depth[i] <= side * limit)) continue;
+            closed.depth[i] = side;
+            ++count;
+        }
+    });
+    hairlines = count;
+    return closed;
+}
+
+void compareEdgesAndDepth(const Picture& open_a, const Picture& open_b, int supersampled,
                           PictureDifference& result) {
     const float weak = kWeakStep * float(supersampled), strong = kStrongStep * float(supersampled);
+    const int width = kHairline * supersampled;
+    const Picture a = closeHairlines(open_a, open_b, width, weak, result.hairline_a);
+    const Picture b = closeHairlines(open_b, open_a, width, weak, result.hairline_b);
     const auto hides = &DepthField::hides, steps = &DepthField::steps;
     std::vector<double> distances;
     addDistances(edges(a, hides, strong), edges(b, steps, weak), a.size, distances);

@@ -14,16 +14,20 @@
 //   also against both straight continuations of the surfaces, in 1 / depth, where these have two
 //   pixels in line. Edges of one picture with a step over kStrongStep are sought among the steps of
 //   the other over kWeakStep, continued or not, so that none is lost for lying at the limit.
+// - Hairlines: slits between near surfaces, at most kHairline wide, through which one picture
+//   shows something farther by a step over kWeakStep, and which the other shows closed. Parts that
+//   touch without being joined may each move by the tolerance T, so slits up to 2 T wide open and
+//   close though nothing has moved further; what was seen through one is hidden, not lost. They
+//   are counted, and closed for the comparison of edges and depths. The reverse, something thin in
+//   front of what is farther, is no hairline, however thin.
 // - Depth: for each pixel covered in both how far its point lies from the other's surface, in
-// pixels
-//   (length * focal / depth). The surface is the points of the pixels in a window of
+//   pixels (length * focal / depth). The surface is the points of the pixels in a window of
 //   (2 kDepthRadius + 1)^2 and the triangles between neighbours that no weak edge separates; where
 //   the window holds nothing nearer it is the difference along the ray. Left out are pixels at a
 //   weak edge of either picture, on either side, where the surface turns away between two samples
 //   (how those moved, the edges tell), and those within kDepthRadius of the border.
 // - Shade: the largest difference of the three channels, over the pixels covered in both, or over
-// all
-//   pixels where a picture has no depth.
+//   all pixels where a picture has no depth.
 //
 // The p99 is the least value that 99 % of the pixels concerned do not exceed. Linear in the number
 // of pixels, uses all threads, and does not depend on how many there are.
@@ -37,6 +41,7 @@ namespace pietra {
 inline constexpr float kWeakStep = 4;    ///< pixels
 inline constexpr float kStrongStep = 8;  ///< pixels
 inline constexpr int kDepthRadius = 2;   ///< pixels
+inline constexpr int kHairline = 1;      ///< pixels
 
 /// Mean, 99th percentile and maximum over `count` pixels; all 0 where there are none.
 struct Spread {
@@ -48,11 +53,12 @@ struct PictureDifference {
     bool has_depth = false;  ///< both pictures have depth; else only `shade` is set
     uint64_t pixels = 0;
     uint64_t covered_a = 0, covered_b = 0;
-    uint64_t only_a = 0, only_b = 0;  ///< covered in one picture
-    Spread coverage_px;               ///< of these, distance to the other's coverage
-    Spread edge_px;                   ///< of strong edges, distance to the other's weak edges
-    Spread depth_px;                  ///< of pixels covered in both, away from edges, both ways
-    Spread shade;                     ///< of 255
+    uint64_t only_a = 0, only_b = 0;          ///< covered in one picture
+    uint64_t hairline_a = 0, hairline_b = 0;  ///< open in one picture
+    Spread coverage_px;                       ///< of these, distance to the other's coverage
+    Spread edge_px;   ///< of strong edges, distance to the other's weak edges
+    Spread depth_px;  ///< of pixels covered in both, away from edges, both ways
+    Spread shade;     ///< of 255
     /// The largest of the three distances.
     double largestPx() const;
 };

@@ -169,6 +169,65 @@ TEST(PictureCompare, AMissingPieceIsFarFromEverything) {
     EXPECT_EQ(compare(b, a).only_b, 400u);
 }
 
+/// A wall at depth 10, but for pixels where `depth` says otherwise.
+template <class Depth>
+Picture wall(const Depth& depth) {
+    Picture picture = empty(120, 100);
+    for (int y = 0; y < 100; ++y)
+        for (int x = 0; x < 120; ++x) picture.depth[picture.index(x, y)] = depth(x, y);
+    return picture;
+}
+
+constexpr float kNear = 10, kFar = 14;  // a step of 120 pixels
+
+TEST(PictureCompare, HairlinesAreCountedAndNotCompared) {
+    const Picture whole = wall([](int, int) { return kNear; });
+    for (const int supersampled : {1, 4})
+        for (const int width : {1, 4, 5})
+            for (const bool steep : {false, true})
+                for (const float behind : {kFar, kNothing}) {
+                    const Picture slit = wall([&](int x, int y) {
+                        const int from_start = steep ? y - 30 - x / 3 : x - 50;
+                        const bool ends = x < 20 || x > 90 || y < 10;
+                        // The side that is a little farther makes no edge of its own.
+                        return !ends && from_start >= 0 && from_start < width ? behind
+                               : from_start < 0                               ? kNear + 0.1f
+                                                                              : kNear;
+                    });
+                    const PictureDifference d = compare(slit, whole, supersampled),
+                                            r = compare(whole, slit, supersampled);
+                    const bool hairline = width <= supersampled;
+                    EXPECT_EQ(d.edge_px.max > 2, !hairline) << supersampled << " " << width;
+                    if (hairline)
+                        EXPECT_EQ(d.hairline_a, uint64_t(width) * (steep ? 71 : 90));
+                    else
+                        EXPECT_LT(d.hairline_a, 20u);  // in the corners of its ends
+                    EXPECT_EQ(d.hairline_b, 0u);
+                    EXPECT_EQ(r.hairline_b, d.hairline_a);
+                    EXPECT_EQ(r.edge_px.max, d.edge_px.max);
+                }
+}
+
+TEST(PictureCompare, NothingElseThatIsThinIsAHairline) {
+    const Picture far = wall([](int, int) { return kFar; });
+    const auto stripes = [](int x) { return x > 30 && x < 90 && x % 2 == 0; };
+    const std::pair<const char*, std::pair<Picture, Picture>> lost[] = {
+        {"a thin bar", {wall([](int x, int) { return x == 60 ? kNear : kFar; }), far}},
+        {"a bar", {wall([](int x, int) { return x / 4 == 15 ? kNear : kFar; }), far}},
+        {"bars beside slits", {wall([&](int x, int) { return stripes(x) ? kNear : kFar; }), far}},
+        {"a step", {wall([](int x, int) { return x < 60 ? kNear : kFar; }), far}},
+        {"a slit into which another step falls",
+         {wall([](int x, int) { return x == 60 ? kFar : kNear; }),
+          wall([](int x, int) { return x < 20 ? kNear : kNear + 1; })}},
+    };
+    for (const auto& [what, pictures] : lost)
+        for (const int supersampled : {1, 4}) {
+            const PictureDifference d = compare(pictures.first, pictures.second, supersampled);
+            EXPECT_EQ(d.hairline_a + d.hairline_b, 0u) << what;
+            EXPECT_GT(d.edge_px.max, 2) << what;
+        }
+}
+
 TEST(PictureCompare, WithoutDepthOnlyShadeIsCompared) {
     Picture a = scene(30, 20, {0, 0, 0});
     Picture b = a;

@@ -51,9 +51,11 @@ VerbText CompareVerb::text() const {
         {"A.png B.png [--max-px X] [--max-shade Y] [--supersampled N] [--json]"},
         {"Compares what two pictures cover, where their depth edges lie, how far their surfaces "
          "are apart (in pixels of displacement), and their shades (of 255). Distances need the "
-         "depth "
-         "that `pietra render` writes into its pictures; other PNG files are compared by shade "
-         "alone.",
+         "depth that `pietra render` writes into its pictures; other PNG files are compared by "
+         "shade alone.",
+         "Slits at most a pixel wide that one picture shows closed are counted as hairlines, and "
+         "not compared: where parts touch without being joined, they open and close although no "
+         "part is displaced by more than the tolerance.",
          "With limits, exit status 6 says that a limit is exceeded."},
         {{"is the picture within a pixel of the full mesh's?",
           "pietra compare one-px.png full.png --max-px 2"}}};
@@ -85,6 +87,7 @@ Json CompareVerb::json(const PictureDifference& difference) const {
     result["covered"] = {{"a", difference.covered_a}, {"b", difference.covered_b}};
     result["coverage"] = {{"only_a", difference.only_a}, {"only_b", difference.only_b}};
     result["coverage_px"] = spreadJson(difference.coverage_px);
+    result["hairlines"] = {{"only_a", difference.hairline_a}, {"only_b", difference.hairline_b}};
     result["edge_px"] = spreadJson(difference.edge_px);
     result["depth_px"] = spreadJson(difference.depth_px);
     result["largest_px"] = difference.largestPx();
@@ -99,6 +102,8 @@ std::string CompareVerb::plain(const PictureDifference& difference) const {
                             difference.covered_b);
         text += spreadText("  distance", difference.coverage_px, "px");
         text += spreadText("depth edges", difference.edge_px, "px");
+        text += fmt::format("{:<12} {} pixels open in A only, {} in B only\n", "hairlines",
+                            difference.hairline_a, difference.hairline_b);
         text += spreadText("depth", difference.depth_px, "px");
     }
     text += spreadText("shade", difference.shade, "of 255");
