@@ -497,7 +497,7 @@ void Viewer::drawScene() {
     const Frame& frame = scene_ ? scene_->update(request) : nothing_;
     shown_ = &frame;
     const auto start = Clock::now();
-    const auto lattice = [&](size_t m) { return models_[m]->info().lattice; };
+    const auto lattice = [&](size_t m) -> const Lattice& { return models_[m]->info().lattice; };
     const Lattice first_lattice = models_.empty() ? Lattice{} : lattice(0);
     const View first(control_.camera(), size, first_lattice);
     if (!rasteriser_ || rasteriser_samples_ != state_.samples)
