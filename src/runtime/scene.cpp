@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "base/check.h"
 #include "base/error.h"
@@ -45,6 +46,7 @@ struct Scene::Model {
           forest(r.nodes()),
           residency(forest, r.pageCount()),
           refiner(residency),
+          closed_parts(closedPartsWithin(r.info(), r.nodes())),
           page_bytes(residentPageBytes(r)),
           last_used(r.pageCount(), 0),
           bad(r.pageCount(), 0),
@@ -66,6 +68,9 @@ struct Scene::Model {
     Forest forest;
     Residency residency;
     ForestRefiner refiner;
+    Box3d closed_parts;
+    std::optional<EyeSide> side;  // of the last eye that was not decided by one before
+    uint64_t side_departures = 0;
     std::vector<size_t> page_bytes;
     std::vector<uint32_t> last_used;         // a page: the frame
     std::vector<uint8_t> bad;                // a page: it cannot be read
@@ -330,10 +335,17 @@ void Scene::Impl::adaptTolerance() {
 }
 
 bool Scene::Impl::mayBeInside(Model& model, const View& view) {
-    EyeSide side(view.eye());
-    model.refiner.visitDrawable(
-        view, kEyeSidePixels, [&](NodeIndex i) { side.add(model.forest.node(i), model.mesh(i)); });
-    return side.mayBeInside();
+    if (!holds(model.closed_parts, view.eye())) return false;
+    // What is drawn is no coarser than what decided the matter, as long as no page has left.
+    const uint64_t departures = model.residency.departures();
+    if (!model.side || departures != model.side_departures || !model.side->decides(view.eye())) {
+        EyeSide& side = model.side.emplace(view.eye());
+        model.side_departures = departures;
+        model.refiner.visitDrawable(view, kEyeSidePixels, [&](NodeIndex i) {
+            side.add(model.forest.node(i), model.mesh(i));
+        });
+    }
+    return model.side->mayBeInside();
 }
 
 void Scene::Impl::describe(const Model& model, uint32_t m, bool show_error, ModelFrame& out) const {

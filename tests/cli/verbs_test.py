@@ -6,6 +6,7 @@ usage: verbs_test.py PIETRA [unittest arguments]
 
 import collections
 import json
+import math
 import os
 import struct
 import subprocess
@@ -243,6 +244,39 @@ class Shown(VerbTest):
                 # Nor is anything left out for being seen from behind.
                 shown("both.png", "--cull", "none", "--two-sided")
                 self.report("compare", "none.png", "both.png", "--json", "--max-px", "1")
+
+    def test_from_within_a_part_that_shares_its_nodes_nothing_is_culled(self):
+        # A closed tube in an open one that ends before it does: few nodes hold the closed one alone.
+        around, vertices, triangles = 24, [], []
+
+        def tube(radius, length):
+            first = len(vertices)
+            for i in range(6 * length + 1):
+                for k in range(around):
+                    angle = 2 * math.pi * k / around
+                    vertices.append((i / 6, radius * math.cos(angle), radius * math.sin(angle)))
+            for i in range(6 * length):
+                for k in range(around):
+                    a, b = (first + i * around + n for n in (k, (k + 1) % around))
+                    triangles.extend([(a, b, a + around), (b, b + around, a + around)])
+            return first
+        tube(1.02, 85)
+        first = tube(1, 100)
+        for k in range(1, around - 1):
+            triangles.append((first, first + k + 1, first + k))
+            last = first + 600 * around
+            triangles.append((last, last + k, last + k + 1))
+        self.write("tubes.ply", mesh_text(vertices, triangles))
+        self.report("build", "tubes.ply", "-o", "tubes.pietra", "--leaf-triangles", "300",
+                    "--patch-triangles", "200", "--report", "-")
+        self.write("c.json", json.dumps({"eye": [10, 0.1, 0.2], "target": [100, 0, 0],
+                                         "up": [0, 0, 1], "fovy_deg": 45}))
+        for pixels in ("0", "1"):
+            for word in ("none", "all"):
+                shown = self.render(f"{word}{pixels}.png", "--camera", "c.json", "--cull", word,
+                                    "--pixels", pixels, models=["tubes.pietra"])
+                self.assertEqual(shown["pixels_covered"], 200 * 160, (word, pixels))
+            self.assertEqual(self.read(f"all{pixels}.png"), self.read(f"none{pixels}.png"))
 
     def test_every_view_of_the_attributes(self):
         pictures = set()
