@@ -17,8 +17,9 @@ struct PageKey {
 
 /// One mesh of a frame's draw list. Plain data; the mesh is not owned.
 struct DrawPatch {
-    /// Never null; must stay as it is until the renderer's draw() has returned. Every vertex has a
-    /// normal; triangles with two equal corners are allowed and draw nothing.
+    /// Must stay as it is until the renderer's draw() has returned; null only for a renderer with
+    /// pages of its own. Every vertex has a normal; triangles with two equal corners are allowed
+    /// and draw nothing.
     const Mesh* mesh = nullptr;
     /// Triangles seen from behind are left out. Only for closed, consistently oriented components;
     /// everything else is drawn, and lit, from both sides.
@@ -29,6 +30,9 @@ struct DrawPatch {
     Rgba8 tint{};
     /// What Show::kLod and Show::kError show of this patch, see ShadeSettings.
     float value = 0;
+    /// Where a renderer with pages of its own (PageSink) finds it: which of the page's patches.
+    PageKey page{};
+    uint32_t patch = 0;
 };
 
 }  // namespace pietra

@@ -13,6 +13,7 @@
 #include "render/gl/draw_programs.h"
 #include "render/gl/frame_block.h"
 #include "render/gl/occlusion.h"
+#include "render/gl/page_store.h"
 #include "render/gl/program.h"
 #include "render/gl/targets.h"
 #include "render/gl/upload_ring.h"
@@ -69,7 +70,7 @@ struct QueuedDraw {
     uint32_t group;  // DrawGroup::key()
     uint32_t item;
     const StoredPage* page;
-    const StoredPatch& patch(const GlItem& i) const { return page->patches[i.patch]; }
+    const StoredPatch& patch(const DrawPatch& i) const { return page->patches[i.patch]; }
 };
 
 }  // namespace
@@ -107,16 +108,16 @@ struct GlRenderer::State {
     void setModel(const View& view, const Lattice& lattice);
     void setState() const;
     static void leaveState();
-    void enqueue(std::span<const GlItem> items);
+    void enqueue(std::span<const DrawPatch> items);
     size_t drawsAtATime() const;
-    void drawInChunks(std::span<const GlItem> items, bool cull);
-    void submit(std::span<const GlItem> items, std::span<const QueuedDraw> chunk, bool cull);
-    void drawCommands(std::span<const GlItem> items, std::span<const QueuedDraw> chunk,
+    void drawInChunks(std::span<const DrawPatch> items, bool cull);
+    void submit(std::span<const DrawPatch> items, std::span<const QueuedDraw> chunk, bool cull);
+    void drawCommands(std::span<const DrawPatch> items, std::span<const QueuedDraw> chunk,
                       GLuint buffer, GLintptr offset);
-    void provideBoxes(std::span<const GlItem> items, std::span<const QueuedDraw> chunk);
+    void provideBoxes(std::span<const DrawPatch> items, std::span<const QueuedDraw> chunk);
     CullRecord boxOf(const StoredPatch& patch) const;
     void bindGroup(const DrawGroup& group);
-    DrawRecord recordOf(const GlItem& item, const QueuedDraw& draw) const;
+    DrawRecord recordOf(const DrawPatch& item, const QueuedDraw& draw) const;
     void finish();
 };
 
@@ -207,12 +208,12 @@ void GlRenderer::State::leaveState() {
     glUseProgram(0);
 }
 
-void GlRenderer::State::enqueue(std::span<const GlItem> items) {
+void GlRenderer::State::enqueue(std::span<const DrawPatch> items) {
     queue.clear();
     const StoredPage* page = nullptr;
     for (uint32_t i = 0; i < items.size(); ++i) {
-        const GlItem& item = items[i];
-        if (page == nullptr || !(items[i - 1].key == item.key)) page = pages.find(item.key);
+        const DrawPatch& item = items[i];
+        if (page == nullptr || !(items[i - 1].page == item.page)) page = pages.find(item.page);
         CHECK(page != nullptr);
         CHECK_LT(size_t(item.patch), page->patches.size());
         if (settings.show == Show::kScalar && page->layout.scalars > 0) {
@@ -231,7 +232,7 @@ void GlRenderer::State::enqueue(std::span<const GlItem> items) {
     });
 }
 
-DrawRecord GlRenderer::State::recordOf(const GlItem& item, const QueuedDraw& draw) const {
+DrawRecord GlRenderer::State::recordOf(const DrawPatch& item, const QueuedDraw& draw) const {
     const bool both_sides = settings.two_sided || !item.one_sided;
     return {draw.patch(item).corner - projection->origin, both_sides ? DrawRecord::kBothSides : 0,
             patchColour(settings, item.id, item.tint, item.value, draw.page->layout.colours),
@@ -275,7 +276,7 @@ CullRecord GlRenderer::State::boxOf(const StoredPatch& patch) const {
             always};
 }
 
-void GlRenderer::State::provideBoxes(std::span<const GlItem> items,
+void GlRenderer::State::provideBoxes(std::span<const DrawPatch> items,
                                      std::span<const QueuedDraw> chunk) {
     const RingSpace space = ring.take(chunk.size() * sizeof(CullRecord), 256);
     for (size_t i = 0; i < chunk.size(); ++i) {
@@ -287,7 +288,7 @@ void GlRenderer::State::provideBoxes(std::span<const GlItem> items,
 }
 
 /// A call for each group of draws.
-void GlRenderer::State::drawCommands(std::span<const GlItem> items,
+void GlRenderer::State::drawCommands(std::span<const DrawPatch> items,
                                      std::span<const QueuedDraw> chunk, GLuint buffer,
                                      GLintptr offset) {
     glBindVertexArray(vertex_array);
@@ -306,14 +307,14 @@ void GlRenderer::State::drawCommands(std::span<const GlItem> items,
 }
 
 /// The lists of `chunk` through the ring, and the calls that draw by them.
-void GlRenderer::State::submit(std::span<const GlItem> items, std::span<const QueuedDraw> chunk,
+void GlRenderer::State::submit(std::span<const DrawPatch> items, std::span<const QueuedDraw> chunk,
                                bool cull) {
     const RingSpace block = ring.take(sizeof(FrameBlock), 256);
     const RingSpace records = ring.take(chunk.size() * sizeof(DrawRecord), 256);
     const RingSpace commands = ring.take(chunk.size() * sizeof(DrawCommand), 256);
     std::memcpy(block.memory, &frame, sizeof(frame));
     for (size_t i = 0; i < chunk.size(); ++i) {
-        const GlItem& item = items[chunk[i].item];
+        const DrawPatch& item = items[chunk[i].item];
         const StoredPatch& patch = chunk[i].patch(item);
         const DrawRecord record = recordOf(item, chunk[i]);
         const DrawCommand command{patch.indices, 1, patch.first_index, patch.base_vertex,
@@ -346,7 +347,7 @@ size_t GlRenderer::State::drawsAtATime() const {
            (sizeof(DrawRecord) + sizeof(DrawCommand) + sizeof(CullRecord));
 }
 
-void GlRenderer::State::drawInChunks(std::span<const GlItem> items, bool cull) {
+void GlRenderer::State::drawInChunks(std::span<const DrawPatch> items, bool cull) {
     CHECK(drawing);
     enqueue(items);
     setState();
@@ -389,8 +390,9 @@ bool GlRenderer::holds(PageKey key) const {
     return state_->pages.find(key) != nullptr;
 }
 
-size_t GlRenderer::uploadRoom() {
-    return state_->ring.room();
+/// note: what is larger than half of the ring may have to wait for itself.
+bool GlRenderer::mayUpload(size_t bytes) {
+    return state_->ring.room() >= std::min(bytes, 4 * state_->ring.largest());
 }
 
 size_t GlRenderer::usedBytes() const {
@@ -423,12 +425,12 @@ void GlRenderer::setModel(const View& view, const Lattice& lattice) {
     state_->setModel(view, lattice);
 }
 
-void GlRenderer::draw(std::span<const GlItem> items) {
-    state_->drawInChunks(items, false);
+void GlRenderer::draw(std::span<const DrawPatch> patches) {
+    state_->drawInChunks(patches, false);
 }
 
-void GlRenderer::drawUnhidden(std::span<const GlItem> items) {
-    state_->drawInChunks(items, true);
+void GlRenderer::drawUnhidden(std::span<const DrawPatch> patches) {
+    state_->drawInChunks(patches, true);
 }
 
 size_t GlRenderer::countUnhidden() const {

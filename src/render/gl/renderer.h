@@ -11,8 +11,7 @@
 // A picture: begin(), then uploads, draws and releases in any order, then readPicture() or
 // present(). Memory for pages is `vram_bytes`, an eighth of it the ring for uploads; targets come
 // on top: 8 bytes a sample and 8 a pixel. All memory is taken and all shaders are compiled when a
-// renderer is made; a frame does neither, nor does it wait, as long as it uploads no more than
-// uploadRoom().
+// renderer is made; a frame does neither, nor does it wait, as long as it uploads what mayUpload().
 //
 // The context must be current whenever anything here is called, also on destruction. Other state of
 // the context than what is bound does not matter, and clip control, culling and tests are left as
@@ -23,23 +22,12 @@
 #include <span>
 
 #include "geometry/lattice.h"
+#include "multires/page_sink.h"
 #include "multires/view.h"
-#include "render/gl/page_store.h"
 #include "render/picture.h"
 #include "render/shading.h"
 
 namespace pietra {
-
-/// A patch to draw. Plain data.
-struct GlItem {
-    PageKey key;         ///< of a page that is uploaded
-    uint32_t patch = 0;  ///< of those of the page
-    // As in DrawPatch.
-    bool one_sided = false;
-    uint32_t id = 0;
-    Rgba8 tint{};
-    float value = 0;
-};
 
 struct GlStatistics {
     uint64_t triangles = 0;     ///< drawn since begin()
@@ -52,28 +40,22 @@ struct GlStatistics {
 /// Least memory for pages.
 inline constexpr size_t kLeastVramBytes = size_t(1) << 19;
 
-class GlRenderer {
+class GlRenderer : public PageSink {
 public:
     /// `samples`: 1 at the pixel's centre, or 4 where the driver has them, shaded once a pixel and
     /// triangle. At least kLeastVramBytes of memory; of more than 8 GiB the rest is not used. What
     /// the driver does not have shows as MemoryError.
     GlRenderer(const PictureSize& size, int samples, size_t vram_bytes);
-    ~GlRenderer();
+    ~GlRenderer() override;
     GlRenderer(const GlRenderer&) = delete;
     GlRenderer& operator=(const GlRenderer&) = delete;
 
-    /// Copies a page's patches; `key` must not be in use. All those with vertices must have the
-    /// same attributes, normals among them, and extents below 2^21 lattice units. False where there
-    /// is no room for the page, and nothing has changed.
-    bool upload(PageKey key, std::span<const Mesh> patches);
-    /// Makes room; what was drawn of the page stays in the picture. The key may be used again.
-    void release(PageKey key);
+    bool upload(PageKey key, std::span<const Mesh> patches) override;
+    void release(PageKey key) override;
+    bool mayUpload(size_t bytes) override;
+    size_t usedBytes() const override;
+    size_t capacityBytes() const override;
     bool holds(PageKey key) const;
-    /// Bytes that can be uploaded now without waiting for the GPU.
-    size_t uploadRoom();
-    /// What pages take now, and what there is for them.
-    size_t usedBytes() const;
-    size_t capacityBytes() const;
 
     /// Another picture of this size from the next begin() on.
     void resize(const PictureSize& size);
@@ -82,11 +64,12 @@ public:
     /// What is drawn from now on lies on another lattice (another model of the same scene); `view`
     /// is the same camera in its coordinates.
     void setModel(const View& view, const Lattice& lattice);
-    void draw(std::span<const GlItem> items);
+    /// Of pages that are uploaded; meshes are not looked at.
+    void draw(std::span<const DrawPatch> patches);
     /// Draws the same, but leaves out on the GPU what is hidden (occlusion.h), by what is drawn
     /// already or by each other: for the frames of a flight, where most that is seen was seen
     /// before. No pixel changes but where surfaces coincide.
-    void drawUnhidden(std::span<const GlItem> items);
+    void drawUnhidden(std::span<const DrawPatch> patches);
     /// Of the patches that it drew last at a time, a call's if they are few, how many were not left
     /// out. Waits for the GPU: not for frames.
     size_t countUnhidden() const;

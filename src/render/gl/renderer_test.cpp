@@ -33,7 +33,7 @@ struct Scene {
         for (Vec3i& p : mesh.position) p += kShift;
         meshes.push_back(std::move(mesh));
         const auto id = uint32_t(patches.size());
-        patches.push_back({&meshes.back(), one_sided, id, {}, float(id)});
+        patches.push_back({&meshes.back(), one_sided, id, {}, float(id), {0, id}, 0});
         return meshes.back();
     }
     void look(const Vec3d& eye, const Vec3d& target, double fovy_deg) {
@@ -80,23 +80,14 @@ Picture drawOnCpu(const Scene& scene, int samples, const ShadeSettings& settings
     return rasteriser.finish();
 }
 
-std::vector<GlItem> itemsOf(const Scene& scene) {
-    std::vector<GlItem> items;
-    for (uint32_t i = 0; i < scene.patches.size(); ++i) {
-        const DrawPatch& p = scene.patches[i];
-        items.push_back({{0, i}, 0, p.one_sided, p.id, p.tint, p.value});
-    }
-    return items;
-}
-
 /// Uploads each mesh as a page, draws all, releases them.
 Picture drawOnGpu(GlRenderer& renderer, const Scene& scene, const ShadeSettings& settings) {
-    const std::vector<GlItem> items = itemsOf(scene);
+    const std::vector<DrawPatch> items = scene.patches;
     for (uint32_t i = 0; i < items.size(); ++i)
-        EXPECT_TRUE(renderer.upload(items[i].key, {scene.patches[i].mesh, 1}));
+        EXPECT_TRUE(renderer.upload(items[i].page, {scene.patches[i].mesh, 1}));
     renderer.begin(scene.view(), Lattice{}, settings);
     renderer.draw(items);
-    for (const GlItem& item : items) renderer.release(item.key);
+    for (const DrawPatch& item : items) renderer.release(item.page);
     return renderer.readPicture();
 }
 
@@ -290,9 +281,9 @@ TEST_F(GlRendererTest, AModelMayLieAnywhereOnTheLatticeAndOnEarth) {
     const View view(Camera{moved(scene.camera.eye), moved(scene.camera.target), scene.camera.up,
                            scene.camera.fovy_deg},
                     scene.size, lattice);
-    const std::vector<GlItem> items = itemsOf(scene);
+    const std::vector<DrawPatch> items = scene.patches;
     for (uint32_t i = 0; i < items.size(); ++i)
-        ASSERT_TRUE(renderer.upload(items[i].key, {scene.patches[i].mesh, 1}));
+        ASSERT_TRUE(renderer.upload(items[i].page, {scene.patches[i].mesh, 1}));
     renderer.begin(view, lattice, {});
     renderer.draw(items);
     const Picture picture = renderer.readPicture();
@@ -314,9 +305,10 @@ TEST_F(GlRendererTest, ModelsOnDifferentLatticesHideEachOther) {
         for (Vec3i& p : meshes[i].position) p = 4 * (p - Vec3i(fine.origin));
     }
     GlRenderer renderer(scene.size, 1, kVram);
-    const std::vector<GlItem> items = itemsOf(scene);
+    const std::vector<DrawPatch> items = scene.patches;
     for (uint32_t i = 0; i < items.size(); ++i)
-        ASSERT_TRUE(renderer.upload(items[i].key, {i < 3 ? &meshes[i] : scene.patches[i].mesh, 1}));
+        ASSERT_TRUE(
+            renderer.upload(items[i].page, {i < 3 ? &meshes[i] : scene.patches[i].mesh, 1}));
     renderer.begin(scene.view(), Lattice{}, {});
     renderer.draw(std::span(items).subspan(3));
     renderer.setModel(scene.view(fine), fine);
@@ -336,8 +328,8 @@ TEST_F(GlRendererTest, DrawsPagesOfSeveralPatchesAndLargeIndices) {
     const std::vector<Mesh> page(scene.meshes.begin(), scene.meshes.end());
     GlRenderer renderer(scene.size, 1, kVram);
     ASSERT_TRUE(renderer.upload({3, 7}, page));
-    std::vector<GlItem> items;
-    for (uint32_t i = 0; i < 3; ++i) items.push_back({{3, 7}, i, false, i, {}, 0});
+    std::vector<DrawPatch> items;
+    for (uint32_t i = 0; i < 3; ++i) items.push_back({nullptr, false, i, {}, 0, {3, 7}, i});
     renderer.begin(scene.view(), Lattice{}, {});
     renderer.draw(items);
     EXPECT_EQ(renderer.statistics().patches, 2u);
@@ -361,38 +353,34 @@ TEST_F(GlRendererTest, PagesComeAndGoInScarceMemory) {
     scene.size = {160, 120};
     scene.look({1500, -1000, 2500}, {2000, 2000, 300}, 60);
     GlRenderer renderer(scene.size, 1, kLeastVramBytes);
-    const std::vector<GlItem> items = itemsOf(scene);
+    const std::vector<DrawPatch> items = scene.patches;
     std::vector<bool> there(items.size(), false);
     size_t refused = 0, uploads = 0;
     for (int step = 0; step < 1500; ++step) {
         const size_t i = random() % items.size();
         if (there[i]) {
-            renderer.release(items[i].key);
+            renderer.release(items[i].page);
             there[i] = false;
         } else {
-            there[i] = renderer.upload(items[i].key, {scene.patches[i].mesh, 1});
+            there[i] = renderer.upload(items[i].page, {scene.patches[i].mesh, 1});
             (there[i] ? uploads : refused)++;
         }
-        ASSERT_EQ(renderer.holds(items[i].key), there[i]);
+        ASSERT_EQ(renderer.holds(items[i].page), there[i]);
         ASSERT_LE(renderer.usedBytes(), renderer.capacityBytes());
         if (step % 100 != 99) continue;
-        std::vector<GlItem> list;
-        std::vector<DrawPatch> patches;
+        std::vector<DrawPatch> list;
         for (size_t k = 0; k < items.size(); ++k)
-            if (there[k]) {
-                list.push_back(items[k]);
-                patches.push_back(scene.patches[k]);
-            }
+            if (there[k]) list.push_back(items[k]);
         renderer.begin(scene.view(), Lattice{}, {});
         renderer.draw(list);
         Rasteriser rasteriser(scene.view(), Lattice{}, 1, {});
-        rasteriser.draw(patches);
+        rasteriser.draw(list);
         expectAlike(rasteriser.finish(), renderer.readPicture(), "step " + std::to_string(step));
     }
     EXPECT_GT(refused, 50u);
     EXPECT_GT(uploads, 200u);
     for (size_t i = 0; i < items.size(); ++i)
-        if (there[i]) renderer.release(items[i].key);
+        if (there[i]) renderer.release(items[i].page);
     EXPECT_EQ(renderer.usedBytes(), 0u);
 }
 
@@ -405,12 +393,12 @@ TEST_F(GlRendererTest, LeavingOutWhatIsHiddenChangesNoPixel) {
         for (size_t begin = 0; begin < mesh.triangleCount(); begin += 60)
             scene.add(part(mesh, begin, std::min(begin + 60, mesh.triangleCount())), one_sided);
     scene.size = {160, 128};
-    std::vector<GlItem> items = itemsOf(scene);
+    std::vector<DrawPatch> items = scene.patches;
     for (const int samples : {1, 4}) {
         GlRenderer plain(scene.size, samples, kVram), culling(scene.size, samples, kVram);
         for (uint32_t i = 0; i < items.size(); ++i)
             for (GlRenderer* renderer : {&plain, &culling})
-                ASSERT_TRUE(renderer->upload(items[i].key, {scene.patches[i].mesh, 1}));
+                ASSERT_TRUE(renderer->upload(items[i].page, {scene.patches[i].mesh, 1}));
         size_t submitted = 0, drawn = 0;
         for (int frame = 0; frame < 24; ++frame) {
             // Small steps, a jump now and then, some of the patches missing.
@@ -436,9 +424,9 @@ TEST_F(GlRendererTest, LeavingOutWhatIsHiddenChangesNoPixel) {
 class Watcher {
 public:
     explicit Watcher(Scene& scene)
-        : scene_(scene), items_(itemsOf(scene)), renderer_(scene.size, 1, kVram) {
+        : scene_(scene), items_(scene.patches), renderer_(scene.size, 1, kVram) {
         for (uint32_t i = 0; i < items_.size(); ++i)
-            EXPECT_TRUE(renderer_.upload(items_[i].key, {scene.patches[i].mesh, 1}));
+            EXPECT_TRUE(renderer_.upload(items_[i].page, {scene.patches[i].mesh, 1}));
     }
     /// How many patches were drawn.
     size_t look(const Vec3d& eye, const Vec3d& target) {
@@ -455,7 +443,7 @@ public:
 
 private:
     Scene& scene_;
-    std::vector<GlItem> items_;
+    std::vector<DrawPatch> items_;
     GlRenderer renderer_;
 };
 
@@ -494,12 +482,12 @@ TEST_F(GlRendererTest, WhatIsReleasedStaysInThePicture) {
     const Scene scene = variedScene();
     GlRenderer renderer(scene.size, 1, kVram);
     const Picture expected = drawOnGpu(renderer, scene, {});
-    const std::vector<GlItem> items = itemsOf(scene);
+    const std::vector<DrawPatch> items = scene.patches;
     renderer.begin(scene.view(), Lattice{}, {});
     for (uint32_t i = 0; i < items.size(); ++i) {
-        ASSERT_TRUE(renderer.upload(items[i].key, {scene.patches[i].mesh, 1}));
+        ASSERT_TRUE(renderer.upload(items[i].page, {scene.patches[i].mesh, 1}));
         renderer.draw({&items[i], 1});
-        renderer.release(items[i].key);
+        renderer.release(items[i].page);
         // Another page takes its place at once.
         ASSERT_TRUE(renderer.upload({1, i}, {&scene.meshes[0], 1}));
         renderer.release({1, i});
@@ -600,7 +588,7 @@ TEST_F(GlRendererTest, FindsFaultWithItsCaller) {
     GlRenderer renderer(scene.size, 1, kVram);
     EXPECT_THROW(renderer.release({0, 0}), BugError);
     renderer.begin(scene.view(), Lattice{}, {});
-    const GlItem item{};
+    const DrawPatch item{};
     EXPECT_THROW(renderer.draw({&item, 1}), BugError);
     ASSERT_TRUE(renderer.upload({0, 0}, {scene.patches[0].mesh, 1}));
     EXPECT_THROW(renderer.upload({0, 0}, {scene.patches[0].mesh, 1}), BugError);

@@ -44,9 +44,11 @@ public:
                 CHECK(renderer_->upload(key, patches));  // see leastGlBatchBytes()
             }
             ++pages_;
-            for (uint32_t i = 0; i < list.size(); ++i)
-                items_.push_back(
-                    {key, i, list[i].one_sided, list[i].id, list[i].tint, list[i].value});
+            for (uint32_t i = 0; i < list.size(); ++i) {
+                list[i].page = key;
+                list[i].patch = i;
+                batch_.push_back(list[i]);
+            }
             statistics_.patches += list.size();
             statistics_.held_bytes = std::max(statistics_.held_bytes, renderer_->usedBytes());
         });
@@ -74,15 +76,15 @@ private:
     }
 
     void drawBatch() {
-        renderer_->draw(items_);
-        items_.clear();
+        renderer_->draw(batch_);
+        batch_.clear();
         for (; first_page_ < pages_; ++first_page_) renderer_->release({0, first_page_});
     }
 
     GlThread thread_;
     std::optional<GlContext> context_;
     std::optional<GlRenderer> renderer_;
-    std::vector<GlItem> items_;
+    std::vector<DrawPatch> batch_;
     uint32_t first_page_ = 0, pages_ = 0;  // numbers of the pages there are
 };
 
