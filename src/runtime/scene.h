@@ -3,26 +3,30 @@
 // frame thread calls update() and draws; it never waits for a file. Whatever has been loaded, every
 // frame is a valid, crack-free cut of each model (residency.h).
 //
-// All models share one budget of decoded pages. Pages that a frame needs are never evicted for
-// others; where they do not fit, the tolerance is raised until they do, and lowered again when
-// there is room. Pages for views to come are loaded after all that are needed now.
+// All models share the budgets: of decoded pages in RAM and, where a renderer draws from memory of
+// its own, of that (page_pool.h). Pages that a frame needs are never evicted for others; where they
+// do not fit, the tolerance is raised until they do, and lowered again when there is room. Pages
+// for views to come are loaded after all that are needed now.
 //
-// One thread calls; deterministic but for what the loader's threads have ready when.
+// One thread calls, the sink's; deterministic but for what the loader's threads have ready when.
 
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "multires/draw_list.h"
+#include "multires/page_sink.h"
 #include "runtime/eye_side.h"
 #include "runtime/forest_refiner.h"
-#include "runtime/page_loader.h"
 
 namespace pietra {
 
 struct SceneSettings {
     size_t ram_bytes = size_t(1) << 30;  ///< of decoded pages, those being decoded included
     int loader_threads = 2;
+    /// What pages must be in to be drawn; must outlive the scene, and have room for pages alone.
+    /// Null: they are drawn from RAM.
+    PageSink* sink = nullptr;
 };
 
 /// What a frame asks for.
@@ -42,7 +46,7 @@ struct ModelFrame {
     View view;
     bool two_sided = false;  ///< the eye may be inside of a closed part
     Selection selection;
-    std::vector<DrawPatch> patches;  ///< meshes are valid until the next update()
+    std::vector<DrawPatch> patches;  ///< valid until the next update(); with a sink, without meshes
 };
 
 struct Frame {
@@ -52,15 +56,16 @@ struct Frame {
     double tolerance_px = 0;
     bool converged = false;  ///< nothing is missing, at the tolerance asked for
     uint64_t triangles = 0, patch_count = 0;
-    size_t resident_bytes = 0;
-    uint64_t bytes_read = 0;  ///< since the beginning
+    size_t resident_bytes = 0;  ///< in RAM
+    size_t device_bytes = 0;    ///< in the sink
+    uint64_t bytes_read = 0;    ///< since the beginning
     double publish_ms = 0, select_ms = 0;
 };
 
 class Scene {
 public:
     /// Models must outlive this. Loads the roots, waiting for them. Throws MemoryError, which says
-    /// how much is needed, if they do not fit, and what reading throws.
+    /// how much is needed where, if they do not fit, and what reading throws.
     Scene(std::vector<const ModelReader*> models, const SceneSettings& settings);
     ~Scene();
 
@@ -74,7 +79,6 @@ public:
     const std::vector<std::string>& faults() const;
 
 private:
-    struct Model;
     class Impl;
     std::unique_ptr<Impl> impl_;
 };

@@ -4,7 +4,10 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <random>
 
+#include "base/check.h"
 #include "base/error.h"
 #include "store/terrain_model.h"
 
@@ -21,12 +24,73 @@ protected:
         directory_ = pattern;
         ToyTerrainSettings settings;
         settings.depth = 12;
+        ToyTerrain terrain = makeToyTerrain(settings);
         path_ = directory_ + "/terrain";
-        writeTerrainModel(makeToyTerrain(settings), path_, directory_, {0, 0, 0});
+        writeTerrainModel(terrain, path_, directory_, {0, 0, 0});
+        for (Node& node : terrain.nodes) node.closed = true;
+        closed_path_ = directory_ + "/closed";
+        writeTerrainModel(terrain, closed_path_, directory_, {0, 0, 0});
     }
     ~SceneTest() override { fs::remove_all(directory_); }
 
     std::string directory_, path_;
+    std::string closed_path_;  // the same, as if it were part of something closed
+};
+
+/// Takes a page where it first fits in one piece, now and then has no time, and trusts nobody.
+class FakeSink : public PageSink {
+public:
+    explicit FakeSink(size_t bytes, double busy = 0) : bytes_(bytes), busy_(busy) {}
+    ~FakeSink() override { EXPECT_TRUE(pages_.empty()) << "pages are left behind"; }
+
+    bool upload(PageKey key, std::span<const Mesh> patches) override {
+        CHECK(!holds(key));
+        size_t size = 0;
+        for (const Mesh& mesh : patches) size += 16 * mesh.vertexCount() + 6 * mesh.triangleCount();
+        size_t begin = 0;
+        for (const auto& [offset, page] : pages_) {
+            if (begin + size <= offset) break;
+            begin = offset + page.size;
+        }
+        if (begin + size > bytes_) {
+            ++refused;
+            return false;
+        }
+        pages_[begin] = {key, size};
+        used_ += size;
+        return true;
+    }
+    void release(PageKey key) override {
+        const auto found = find(key);
+        CHECK(found != pages_.end());
+        ++released;
+        used_ -= found->second.size;
+        pages_.erase(found);
+    }
+    bool mayUpload(size_t) override {
+        return std::uniform_real_distribution<>(0, 1)(random_) >= busy_;
+    }
+    size_t usedBytes() const override { return used_; }
+    size_t capacityBytes() const override { return bytes_; }
+    bool holds(PageKey key) { return find(key) != pages_.end(); }
+
+    int refused = 0, released = 0;
+
+private:
+    struct Page {
+        PageKey key;
+        size_t size;
+    };
+    std::map<size_t, Page>::iterator find(PageKey key) {
+        return std::find_if(pages_.begin(), pages_.end(),
+                            [&](const auto& page) { return page.second.key == key; });
+    }
+
+    const size_t bytes_;
+    const double busy_;
+    size_t used_ = 0;
+    std::map<size_t, Page> pages_;  // by offset
+    std::mt19937 random_{1};
 };
 
 /// Frame i of a flight around the model and close over it.
@@ -92,6 +156,93 @@ TEST_F(SceneTest, everyFrameIsValidInAnyBudget) {
     }
 }
 
+TEST_F(SceneTest, everyFrameIsValidInAnyTwoBudgets) {
+    const ModelReader open(path_), closed(closed_path_);
+    const size_t all = sizeOfAll(open);
+    int refused = 0;
+    for (const auto& [ram, device] :
+         {std::pair(all / 40, all / 40), std::pair(all / 40, all), std::pair(all / 4, all / 10),
+          std::pair(4 * all, all / 3), std::pair(4 * all, 2 * all)}) {
+        FakeSink sink(device, 0.3);
+        Scene scene({&open, &closed}, {ram, 3, &sink});
+        double finest = 1e300;
+        for (int i = 0; i < 150; ++i) {
+            FrameRequest request = flight(open, i < 100 ? i : 31 * i);
+            request.culling = {};
+            request.prefetch = i % 100 < 50;
+            const Frame& frame = scene.update(request);
+            for (const ModelFrame& model : frame.models) {
+                ASSERT_EQ(validateCut(open.nodes(), model.selection.draw), "");
+                for (const DrawPatch& patch : model.patches) ASSERT_TRUE(sink.holds(patch.page));
+            }
+            ASSERT_LE(frame.resident_bytes, ram);
+            ASSERT_EQ(frame.device_bytes, sink.usedBytes());
+            finest = std::min(finest, frame.tolerance_px);
+            if (i % 3 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+        EXPECT_LT(finest, 1e300);
+        refused += sink.refused;
+    }
+    EXPECT_GT(refused, 0);
+}
+
+TEST_F(SceneTest, whatIsDrawnElsewhereNeedNotFitIntoRam) {
+    const ModelReader model(closed_path_);
+    const size_t all = sizeOfAll(model), little = all / 12;
+    FakeSink sink(all);
+    Scene scene({&model}, {little, 2, &sink});
+    for (int i = 0; i < 200; i += 40) {
+        FrameRequest request = flight(model, i);
+        request.pixels = 0.3;
+        const Frame& frame = scene.converge(request);
+        EXPECT_TRUE(frame.converged);
+        EXPECT_LE(frame.resident_bytes, little);
+        EXPECT_GT(frame.device_bytes, 2 * little);
+        Culling culling = request.culling;
+        culling.cone &= !frame.models[0].two_sided;
+        EXPECT_EQ(frame.models[0].selection.draw,
+                  visibleCut(model.nodes(), frame.models[0].view, request.pixels, culling).nodes);
+    }
+}
+
+TEST_F(SceneTest, whatComesBackToTheSinkIsNotReadAgain) {
+    const ModelReader model(path_);
+    const size_t all = sizeOfAll(model);
+    FakeSink sink(all / 5);
+    Scene scene({&model}, {2 * all, 2, &sink});
+    FrameRequest request = flight(model, 0);
+    request.pixels = 0.1;
+    request.prefetch = false;
+    const Vec3d centre = request.camera.target;
+    uint64_t read = 0;
+    for (int i = 0; i < 12; ++i) {  // down at one corner after the other
+        const Vec3d side(i % 2 == 0 ? 30 : -30, i % 4 < 2 ? 30 : -30, 0);
+        request.camera.target = centre + side;
+        request.camera.eye = centre + 1.2 * side + Vec3d(0, 0, 15);
+        const Frame& frame = scene.converge(request);
+        EXPECT_TRUE(frame.converged);
+        if (i == 7) read = frame.bytes_read;
+        if (i > 7) {
+            EXPECT_EQ(frame.bytes_read, read);
+        }
+    }
+    EXPECT_GT(sink.released, 100) << sink.usedBytes() << " of " << all;
+}
+
+TEST_F(SceneTest, tooLittleRoomToDrawRaisesTheToleranceAndStaysWithinIt) {
+    const ModelReader model(path_);
+    const size_t all = sizeOfAll(model);
+    FakeSink sink(all / 10);
+    Scene scene({&model}, {all, 2, &sink});
+    FrameRequest request = flight(model, 0);
+    request.pixels = 0.01;
+    request.culling = {};
+    EXPECT_GT(scene.converge(request).tolerance_px, request.pixels);
+    request.pixels = 64;
+    for (int i = 0; i < 2000 && !scene.update(request).converged; ++i) scene.converge(request);
+    EXPECT_TRUE(scene.update(request).converged);
+}
+
 TEST_F(SceneTest, tooSmallABudgetRaisesTheToleranceAndStaysWithinIt) {
     const ModelReader model(path_);
     const size_t all = sizeOfAll(model);
@@ -112,6 +263,13 @@ TEST_F(SceneTest, tooSmallABudgetRaisesTheToleranceAndStaysWithinIt) {
 TEST_F(SceneTest, saysHowMuchTheRootsNeed) {
     const ModelReader model(path_);
     EXPECT_THROW(Scene({&model}, {100, 1}), MemoryError);
+    FakeSink sink(100);
+    try {
+        Scene({&model}, {size_t(1) << 30, 1, &sink});
+        FAIL() << "it needs more";
+    } catch (const MemoryError& error) {
+        EXPECT_NE(std::string(error.what()).find("of graphics memory"), std::string::npos);
+    }
 }
 
 TEST_F(SceneTest, aDamagedPageIsDrawnCoarser) {
