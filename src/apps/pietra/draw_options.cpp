@@ -1,5 +1,9 @@
 #include "apps/pietra/draw_options.h"
 
+#include <fmt/format.h>
+
+#include "base/text.h"
+
 namespace pietra {
 
 void CullOption::declare(OptionSet& options, const char* help) {
@@ -9,6 +13,18 @@ void CullOption::declare(OptionSet& options, const char* help) {
 Culling CullOption::culling() const {
     const bool all = word_ == "all";
     return {all || word_ == "frustum", all || word_ == "cone", all, all || word_ == "occlusion"};
+}
+
+void declareVram(OptionSet& options, uint64_t& bytes) {
+    options.size("--vram", bytes,
+                 "Most graphics memory for what is loaded, with --renderer gl: what is drawn must "
+                 "fit into it, and --ram only bounds what is kept beside it.");
+}
+
+std::string memoryMessage(uint64_t ram, uint64_t vram, const MemoryError& error) {
+    return vram == 0 ? fmt::format("--ram {}: {}", formatBytes(ram), error.what())
+                     : fmt::format("--ram {}, --vram {}: {}", formatBytes(ram), formatBytes(vram),
+                                   error.what());
 }
 
 }  // namespace pietra

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "apps/pietra/option_set.h"
+#include "base/error.h"
 #include "multires/cut.h"
 
 namespace pietra {
@@ -17,5 +18,10 @@ public:
 private:
     std::string word_ = "all";
 };
+
+/// --vram.
+void declareVram(OptionSet& options, uint64_t& bytes);
+/// Of a scene that does not fit the limits given; `vram` is 0 where there is none.
+std::string memoryMessage(uint64_t ram, uint64_t vram, const MemoryError& error);
 
 }  // namespace pietra

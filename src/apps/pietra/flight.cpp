@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <optional>
+#include <memory>
 #include <thread>
 
 #include "base/check.h"
-#include "render/raster/rasteriser.h"
+#include "render/live/gl_live.h"
 
 namespace pietra {
 namespace {
@@ -28,7 +28,11 @@ class Flight {
 public:
     Flight(const std::vector<const ModelReader*>& models, const CameraPath& path,
            const FlightSettings& settings)
-        : models_(models), path_(path), settings_(settings), scene_(models, settings.scene) {}
+        : models_(models),
+          path_(path),
+          settings_(settings),
+          renderer_(makeRenderer()),
+          scene_(models, sceneSettings()) {}
 
     FlightRecord run(const std::function<void(int)>& progress) {
         const auto start = Clock::now();
@@ -39,12 +43,27 @@ public:
         }
         record_.seconds = msSince(start) / 1e3;
         awaitConvergence();
-        if (settings_.draw) compareWithStaticDraws();
+        if (renderer_) compareWithStaticDraws();
         record_.faults = scene_.faults();
         return std::move(record_);
     }
 
 private:
+    using Draw = FlightSettings::Draw;
+
+    std::unique_ptr<LiveRenderer> makeRenderer() const {
+        if (settings_.draw == Draw::kNothing) return nullptr;
+        if (settings_.draw == Draw::kCpu) return makeRasterLive();
+        return std::make_unique<GlLive>(GlContext::headless(), settings_.size,
+                                        settings_.vram_bytes);
+    }
+
+    SceneSettings sceneSettings() const {
+        SceneSettings scene = settings_.scene;
+        if (renderer_) scene.sink = renderer_->sink();
+        return scene;
+    }
+
     double timeOf(int i) const {
         return settings_.frames == 1 ? 0 : path_.seconds * i / (settings_.frames - 1);
     }
@@ -71,13 +90,17 @@ private:
         FrameRecord record;
         record.select_ms = frame.select_ms;
         record.load_ms = frame.publish_ms;
-        if (settings_.draw) record.draw_ms = draw(frame);
+        if (renderer_) {
+            record.draw_ms = draw(frame);
+            record.gpu_ms = renderer_->gpuMs();
+        }
         record.ms = msSince(start);
         record.triangles = frame.triangles;
         record.patches = frame.patch_count;
         record.bytes_read = frame.bytes_read - bytes_read_;
         bytes_read_ = frame.bytes_read;
         record.resident_bytes = frame.resident_bytes;
+        record.device_bytes = frame.device_bytes;
         record.tolerance_px = frame.tolerance_px;
         record.converged = frame.converged;
         if (record_.first_image_ms < 0 && record.tolerance_px <= kFirstImagePx)
@@ -87,17 +110,12 @@ private:
 
     double draw(const Frame& frame) {
         const auto start = Clock::now();
-        const auto lattice = [&](size_t m) -> const Lattice& { return models_[m]->info().lattice; };
-        const ShadeSettings shade;
-        if (!rasteriser_)
-            rasteriser_.emplace(frame.models[0].view, lattice(0), settings_.samples, shade);
-        else
-            rasteriser_->restart(frame.models[0].view, lattice(0), shade);
         std::vector<ModelPatches> list;
         for (size_t m = 0; m < frame.models.size(); ++m)
-            list.push_back({frame.models[m].view, &lattice(m), frame.models[m].patches});
-        rasteriser_->draw(list, settings_.culling.occlusion);
-        rasteriser_->finish();
+            list.push_back(
+                {frame.models[m].view, &models_[m]->info().lattice, frame.models[m].patches});
+        renderer_->draw(list, {{}, settings_.samples, settings_.culling.occlusion});
+        renderer_->wait();
         return msSince(start);
     }
 
@@ -139,8 +157,8 @@ private:
     std::vector<const ModelReader*> models_;
     const CameraPath& path_;
     const FlightSettings& settings_;
+    std::unique_ptr<LiveRenderer> renderer_;  // null: nothing is drawn
     Scene scene_;
-    std::optional<Rasteriser> rasteriser_;
     uint64_t bytes_read_ = 0;
     FlightRecord record_;
 };

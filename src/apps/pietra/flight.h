@@ -17,7 +17,8 @@ struct FlightSettings {
     Culling culling{true, true, true, true};
     bool prefetch = true;
     int samples = 1;
-    bool draw = true;
+    enum class Draw { kNothing, kCpu, kGl } draw = Draw::kCpu;
+    size_t vram_bytes = size_t(1) << 30;  ///< of graphics memory, for pages
     /// In real time: no frame is shown before its time on the path. Else as fast as it can.
     bool real_time = false;
     SceneSettings scene;
@@ -25,9 +26,10 @@ struct FlightSettings {
 
 struct FrameRecord {
     double ms = 0, select_ms = 0, load_ms = 0, draw_ms = 0;
+    double gpu_ms = 0;  ///< by the GPU's own clock; 0: not known
     uint64_t triangles = 0, patches = 0;
     uint64_t bytes_read = 0;  ///< in this frame
-    size_t resident_bytes = 0;
+    size_t resident_bytes = 0, device_bytes = 0;
     double tolerance_px = 0;
     bool converged = false;
 };
@@ -48,7 +50,8 @@ inline constexpr double kFirstImagePx = 16;
 /// Since the process started, about.
 double msSinceStart();
 
-/// Throws what opening a scene throws. `progress(i)` after each frame.
+/// Throws what opening a scene throws, and UsageError where there is no OpenGL. `progress(i)` after
+/// each frame.
 FlightRecord fly(const std::vector<const ModelReader*>& models, const CameraPath& path,
                  const FlightSettings& settings, const std::function<void(int)>& progress);
 

@@ -53,7 +53,7 @@ private:
     std::string samples_ = "1";
     CullOption cull_;
     std::string prefetch_ = "on";
-    uint64_t ram_ = uint64_t(1) << 30;
+    uint64_t ram_ = uint64_t(1) << 30, vram_ = uint64_t(1) << 30;
     bool cold_ = false;
     std::optional<uint64_t> jobs_;
 };
@@ -98,6 +98,7 @@ void BenchVerb::declare(OptionSet& options) {
     options.choice("--prefetch", prefetch_, {"on", "off"},
                    "Load what views to come will need, too.");
     options.size("--ram", ram_, "Most memory for what is loaded.");
+    declareVram(options, vram_);
     options.flag("--cold", cold_, "Drop the system's cache of the files, and fly in real time.");
     options.count("-j,--jobs", "N", jobs_, {.min = 1, .max = 1024}, "Threads to work with.")
         .defaultsTo("all cores");
@@ -141,7 +142,11 @@ FlightSettings BenchVerb::settings(const CameraPath& path) const {
     settings.culling = cull_.culling();
     settings.prefetch = prefetch_ == "on";
     settings.samples = samples_ == "4" ? 4 : 1;
-    settings.draw = renderer_ != "none";
+    using Draw = FlightSettings::Draw;
+    settings.draw = renderer_ == "gl"    ? Draw::kGl
+                    : renderer_ == "cpu" ? Draw::kCpu
+                                         : Draw::kNothing;
+    settings.vram_bytes = size_t(vram_);
     settings.real_time = cold_;
     settings.scene.ram_bytes = size_t(ram_);
     return settings;
@@ -154,7 +159,7 @@ Json finite(double value) {
 
 Json BenchVerb::report(const FlightRecord& record) const {
     Json frames = Json::array();
-    std::vector<double> ms;
+    std::vector<double> ms, gpu_ms;
     double triangles = 0;
     uint64_t bytes_read = 0;
     for (const FrameRecord& f : record.frames) {
@@ -166,12 +171,14 @@ Json BenchVerb::report(const FlightRecord& record) const {
                           {"patches", f.patches},
                           {"operations", 0},
                           {"bytes_read", f.bytes_read},
-                          {"resident_bytes", f.resident_bytes},
+                          {"gpu_ms", f.gpu_ms},
+                          {"resident_bytes", {{"ram", f.resident_bytes}, {"vram", f.device_bytes}}},
                           {"tolerance_px", finite(f.tolerance_px)},
                           {"converged", f.converged}});
         triangles += double(f.triangles);
         bytes_read += f.bytes_read;
         ms.push_back(f.ms);
+        gpu_ms.push_back(f.gpu_ms);
     }
     double busy_ms = 0;
     for (const double m : ms) busy_ms += m;
@@ -181,6 +188,7 @@ Json BenchVerb::report(const FlightRecord& record) const {
                    {"p95", percentile(ms, 0.95)},
                    {"p99", percentile(ms, 0.99)},
                    {"max", percentile(ms, 1)}}},
+                 {"gpu_ms", {{"median", percentile(gpu_ms, 0.5)}, {"max", percentile(gpu_ms, 1)}}},
                  {"seconds", record.seconds},
                  {"triangles_per_second", 1e3 * triangles / busy_ms},
                  {"operations_per_second", 0},
@@ -199,8 +207,6 @@ Json BenchVerb::report(const FlightRecord& record) const {
 }
 
 int BenchVerb::run(const RunContext& context) {
-    if (renderer_ == "gl")
-        throw UsageError("--renderer gl: the OpenGL renderer is not there yet; use cpu");
     const ThreadLimit threads(Limits{{}, jobs_}.threads());
     checkOutput(context.common.report, context.common.force);
     if (cold_)
@@ -214,7 +220,9 @@ int BenchVerb::run(const RunContext& context) {
     try {
         record = fly(files.views(), camera_path, flight, [&](int) { context.progress.tick(1); });
     } catch (const MemoryError& error) {
-        throw MemoryError(fmt::format("--ram {}: {}", formatBytes(ram_), error.what()));
+        throw MemoryError(memoryMessage(ram_, renderer_ == "gl" ? vram_ : 0, error));
+    } catch (const UsageError& error) {
+        throw UsageError(fmt::format("--renderer {}: {}", renderer_, error.what()));
     }
     context.progress.endStage();
     for (const std::string& fault : record.faults) logWarning(fault);

@@ -80,7 +80,8 @@ struct GlRenderer::State {
     UploadRing ring;
     PageStore pages;
     Targets targets;
-    std::array<GlProgram, kLooks> programs;
+    std::array<GlProgram, kLooks> programs[2];  // with 1 and 4 samples
+    int samples;
     GlTexture scalar_colours;
     GlVertexArray vertex_array;
     OcclusionCuller culler;
@@ -103,6 +104,7 @@ struct GlRenderer::State {
     std::vector<QueuedDraw> queue;  // of one draw(), kept for its memory
 
     State(const PictureSize& size, int samples, size_t vram_bytes);
+    void resize(const PictureSize& size, int with_samples);
     void beginTimer();
     void readTimer(Timer& timer);
     void setModel(const View& view, const Lattice& lattice);
@@ -121,14 +123,15 @@ struct GlRenderer::State {
     void finish();
 };
 
-GlRenderer::State::State(const PictureSize& size, int samples, size_t vram_bytes)
+GlRenderer::State::State(const PictureSize& size, int with_samples, size_t vram_bytes)
     : ring(ringBytes(vram_bytes)),
       pages(vram_bytes - ringBytes(vram_bytes), ring),
-      targets(size, samples),
-      programs(makeDrawPrograms(samples)),
+      targets(size, with_samples),
+      samples(with_samples),
       scalar_colours(makeScalarColours()),
       vertex_array(makeVertexArray(pages.buffer())),
       culler(drawsAtATime(), pages.capacity(), isLlvmpipe()) {
+    resize(size, samples);
     GLuint names[4];
     glCreateQueries(GL_TIMESTAMP, 4, names);
     for (int i = 0; i < 2; ++i)
@@ -136,6 +139,15 @@ GlRenderer::State::State(const PictureSize& size, int samples, size_t vram_bytes
     if (glGetError() == GL_OUT_OF_MEMORY)
         throw MemoryError(
             fmt::format("there are no {} of graphics memory", formatBytes(vram_bytes)));
+}
+
+void GlRenderer::State::resize(const PictureSize& size, int with_samples) {
+    CHECK(!drawing);
+    if (size.width != targets.size().width || size.height != targets.size().height ||
+        with_samples != samples)
+        targets.resize(size, with_samples);
+    samples = with_samples;
+    if (programs[samples == 4][0] == 0) programs[samples == 4] = makeDrawPrograms(samples);
 }
 
 void GlRenderer::State::readTimer(Timer& t) {
@@ -241,7 +253,7 @@ DrawRecord GlRenderer::State::recordOf(const DrawPatch& item, const QueuedDraw& 
 
 void GlRenderer::State::bindGroup(const DrawGroup& group) {
     const Look look = lookOf(settings.show, group.layout);
-    glUseProgram(programs[size_t(look)]);
+    glUseProgram(programs[samples == 4][size_t(look)]);
     (group.culled ? glEnable : glDisable)(GL_CULL_FACE);
     const auto bind = [&](GLuint attribute, uint32_t offset) {
         glVertexArrayVertexBuffer(vertex_array, attribute, pages.buffer(), GLintptr(offset),
@@ -367,7 +379,9 @@ void GlRenderer::State::finish() {
 }
 
 GlRenderer::GlRenderer(const PictureSize& size, int samples, size_t vram_bytes) {
-    CHECK_LE(kLeastVramBytes, vram_bytes);
+    if (vram_bytes < kLeastVramBytes)
+        throw MemoryError(
+            fmt::format("OpenGL needs {} of graphics memory", formatBytes(kLeastVramBytes)));
     while (glGetError() != GL_NO_ERROR) {  // of others
     }
     state_ = std::make_unique<State>(size, samples, vram_bytes);
@@ -403,9 +417,8 @@ size_t GlRenderer::capacityBytes() const {
     return state_->pages.capacity();
 }
 
-void GlRenderer::resize(const PictureSize& size) {
-    CHECK(!state_->drawing);
-    state_->targets.resize(size);
+void GlRenderer::resize(const PictureSize& size, int samples) {
+    state_->resize(size, samples);
 }
 
 void GlRenderer::begin(const View& view, const Lattice& lattice, const ShadeSettings& settings) {
@@ -439,6 +452,17 @@ size_t GlRenderer::countUnhidden() const {
 
 void GlRenderer::finish() {
     state_->finish();
+}
+
+void GlRenderer::wait() {
+    state_->finish();
+    glFinish();
+    state_->readTimer(state_->timer[state_->current_timer]);
+}
+
+float GlRenderer::depthAt(int x, int y) {
+    state_->finish();
+    return state_->targets.depthAt(x, y);
 }
 
 Picture GlRenderer::readPicture() {

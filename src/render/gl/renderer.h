@@ -43,8 +43,8 @@ inline constexpr size_t kLeastVramBytes = size_t(1) << 19;
 class GlRenderer : public PageSink {
 public:
     /// `samples`: 1 at the pixel's centre, or 4 where the driver has them, shaded once a pixel and
-    /// triangle. At least kLeastVramBytes of memory; of more than 8 GiB the rest is not used. What
-    /// the driver does not have shows as MemoryError.
+    /// triangle. Of more than 8 GiB of memory the rest is not used. Throws MemoryError for less
+    /// than kLeastVramBytes, and for what the driver does not have.
     GlRenderer(const PictureSize& size, int samples, size_t vram_bytes);
     ~GlRenderer() override;
     GlRenderer(const GlRenderer&) = delete;
@@ -57,8 +57,9 @@ public:
     size_t capacityBytes() const override;
     bool holds(PageKey key) const;
 
-    /// Another picture of this size from the next begin() on.
-    void resize(const PictureSize& size);
+    /// Pictures of this size, with so many samples, from the next begin() on. Compiles shaders when
+    /// a number of samples is asked for the first time.
+    void resize(const PictureSize& size, int samples);
     /// Begins a picture; `view` must have been made with `lattice` and be of the picture's size.
     void begin(const View& view, const Lattice& lattice, const ShadeSettings& settings);
     /// What is drawn from now on lies on another lattice (another model of the same scene); `view`
@@ -75,8 +76,11 @@ public:
     size_t countUnhidden() const;
     /// Completes the picture, without waiting for it. Nothing can be drawn before the next begin().
     void finish();
-    /// Completes the picture and waits for it.
+    /// Completes the picture and waits for it, as all that follows up to present().
+    void wait();
     Picture readPicture();
+    /// Of a pixel of the picture: its depth as in Picture.
+    float depthAt(int x, int y);
     /// Completes the picture and copies it to the window's lower left corner.
     void present();
 

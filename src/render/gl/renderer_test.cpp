@@ -504,7 +504,7 @@ TEST_F(GlRendererTest, EmptyPicturesAreTheBackgroundAndSizesMayChange) {
     for (const PictureSize size :
          {PictureSize{320, 200}, PictureSize{333, 7}, PictureSize{1, 1}, PictureSize{640, 480}}) {
         scene.size = size;
-        renderer.resize(size);
+        renderer.resize(size, 4);
         ShadeSettings settings;
         settings.background_top.r = uint8_t(size.height);
         for (const Show show : {Show::kShaded, Show::kDepth}) {

@@ -31,8 +31,7 @@ GlFramebuffer makeFramebuffer(GLuint depth, std::initializer_list<GLuint> colour
 
 }  // namespace
 
-Targets::Targets(const PictureSize& size, int samples) : samples_(samples) {
-    CHECK(samples == 1 || samples == 4);
+Targets::FinishPrograms::FinishPrograms(int samples) {
     const std::string defines = fmt::format("#define SAMPLES {}\n", samples);
     const auto finishProgram = [&](const char* more) {
         return makeProgram({{GL_VERTEX_SHADER, {"picture_finish.vert.glsl"}},
@@ -40,18 +39,21 @@ Targets::Targets(const PictureSize& size, int samples) : samples_(samples) {
                              {"srgb.glsl", "picture_finish.glsl", "picture_finish.frag.glsl"}}},
                            defines + more);
     };
-    finish_program_ = finishProgram("");
-    depth_program_ = finishProgram("#define SHOW_DEPTH\n");
-    first_range_program_ =
+    picture = finishProgram("");
+    depth_picture = finishProgram("#define SHOW_DEPTH\n");
+    first_range =
         makeProgram({{GL_VERTEX_SHADER, {"picture_finish.vert.glsl"}},
                      {GL_FRAGMENT_SHADER, {"picture_finish.glsl", "depth_range.frag.glsl"}}},
                     defines + "#define FIRST\n");
+}
+
+Targets::Targets(const PictureSize& size, int samples) {
     range_program_ = makeProgram({{GL_VERTEX_SHADER, {"picture_finish.vert.glsl"}},
                                   {GL_FRAGMENT_SHADER, {"depth_range.frag.glsl"}}});
     GLuint name = 0;
     glCreateVertexArrays(1, &name);
     no_vertices_ = GlVertexArray(name);
-    resize(size);
+    resize(size, samples);
 }
 
 GlTexture Targets::makeTexture(GLenum format, bool multisampled) const {
@@ -64,8 +66,12 @@ GlTexture Targets::makeTexture(GLenum format, bool multisampled) const {
     return GlTexture(name);
 }
 
-void Targets::resize(const PictureSize& size) {
+void Targets::resize(const PictureSize& size, int samples) {
+    CHECK(samples == 1 || samples == 4);
     size_ = size;
+    samples_ = samples;
+    std::optional<FinishPrograms>& programs = programs_[samples == 4];
+    if (!programs) programs.emplace(samples);
     const bool many = samples_ > 1;
     colour_ = makeTexture(GL_SRGB8_ALPHA8, many);
     depth_ = makeTexture(GL_DEPTH_COMPONENT32F, many);
@@ -131,7 +137,7 @@ void Targets::makeRangeSteps() {
 
 /// Leaves the texture with the result bound.
 void Targets::findDepthRange() const {
-    glUseProgram(first_range_program_);
+    glUseProgram(programs().first_range);
     for (const RangeStep& step : range_steps_) {
         glBindFramebuffer(GL_FRAMEBUFFER, step.frame);
         glViewport(0, 0, step.size.width, step.size.height);
@@ -161,7 +167,7 @@ void Targets::finish(float reference, bool show_depth, UploadRing& ring) {
     if (show_depth) findDepthRange();
     glBindFramebuffer(GL_FRAMEBUFFER, finished_);
     glViewport(0, 0, size_.width, size_.height);
-    glUseProgram(show_depth ? depth_program_ : finish_program_);
+    glUseProgram(show_depth ? programs().depth_picture : programs().picture);
     glDrawArrays(GL_TRIANGLES, 0, 3);
     ring.used();
 }
@@ -177,6 +183,15 @@ void Targets::read(Picture& picture) const {
     glReadPixels(0, 0, size_.width, size_.height, GL_RGBA, GL_UNSIGNED_BYTE, picture.colour.data());
     glNamedFramebufferReadBuffer(finished_, GL_COLOR_ATTACHMENT1);
     glReadPixels(0, 0, size_.width, size_.height, GL_RED, GL_FLOAT, picture.depth.data());
+}
+
+float Targets::depthAt(int x, int y) const {
+    float depth = 0;
+    glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, finished_);
+    glNamedFramebufferReadBuffer(finished_, GL_COLOR_ATTACHMENT1);
+    glReadPixels(x, y, 1, 1, GL_RED, GL_FLOAT, &depth);
+    return depth;
 }
 
 void Targets::present() const {

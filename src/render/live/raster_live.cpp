@@ -1,0 +1,39 @@
+#include <optional>
+
+#include "render/live/live_renderer.h"
+
+namespace pietra {
+namespace {
+
+class RasterLive : public LiveRenderer {
+public:
+    PageSink* sink() override { return nullptr; }
+
+    void draw(std::span<const ModelPatches> models, const LiveSettings& settings) override {
+        const ModelPatches& first = models.front();
+        if (!rasteriser_ || samples_ != settings.samples)
+            rasteriser_.emplace(first.view, *first.lattice, settings.samples, settings.shade);
+        else
+            rasteriser_->restart(first.view, *first.lattice, settings.shade);
+        samples_ = settings.samples;
+        rasteriser_->draw(models, settings.leave_out_hidden);
+        picture_ = &rasteriser_->finish();
+    }
+    void wait() override {}
+    const Picture& picture() override { return *picture_; }
+    float depthAt(int x, int y) override { return picture_->depth[picture_->index(x, y)]; }
+    double gpuMs() const override { return 0; }
+
+private:
+    std::optional<Rasteriser> rasteriser_;
+    int samples_ = 0;
+    const Picture* picture_ = nullptr;
+};
+
+}  // namespace
+
+std::unique_ptr<LiveRenderer> makeRasterLive() {
+    return std::make_unique<RasterLive>();
+}
+
+}  // namespace pietra
