@@ -44,13 +44,18 @@ void drawFigures(const FrameFigures& figures) {
     ImGui::PlotLines("##ms", figures.ms.data(), FrameFigures::kHistory, figures.next, nullptr, 0,
                      100, ImVec2(250, 40));
     text(fmt::format("{:.1f} ms a frame, drawing {:.1f} ms", last, figures.draw_ms));
+    if (figures.gpu_ms > 0) text(fmt::format("{:.1f} ms of the GPU", figures.gpu_ms));
     text(fmt::format("{} triangles in {} patches", formatCount(double(figures.triangles)),
                      figures.patches));
     ImGui::PlotLines("##memory", figures.megabytes.data(), FrameFigures::kHistory, figures.next,
                      nullptr, 0, float(figures.ram_bytes) / (1 << 20), ImVec2(250, 25));
     text(fmt::format("memory {} of {}", formatBytes(figures.resident_bytes),
                      formatBytes(figures.ram_bytes)));
+    if (figures.vram_bytes > 0)
+        text(fmt::format("graphics memory {} of {}", formatBytes(figures.device_bytes),
+                         formatBytes(figures.vram_bytes)));
     text(fmt::format("read {}", formatBytes(figures.bytes_read)));
+    text(fmt::format("drawn by {}", figures.renderer));
     text(fmt::format("within {:.3g} px{}", figures.tolerance_px,
                      figures.converged ? "" : ", loading"));
 }

@@ -35,10 +35,13 @@ struct FrameFigures {
     std::array<float, kHistory> ms{}, megabytes{};
     int next = 0;
     double draw_ms = 0;
+    double gpu_ms = 0;  ///< by the GPU's own clock; 0: not known
     double tolerance_px = 0;
     bool converged = false;
     uint64_t triangles = 0, patches = 0;
     size_t resident_bytes = 0, ram_bytes = 0;
+    size_t device_bytes = 0, vram_bytes = 0;  ///< there is none if 0
+    std::string renderer;
     uint64_t bytes_read = 0;
 
     void add(float frame_ms) {

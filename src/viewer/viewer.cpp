@@ -14,12 +14,11 @@
 #include <optional>
 
 #include "base/error.h"
-#include "render/raster/rasteriser.h"
 #include "runtime/camera_path.h"
 #include "runtime/pick.h"
-#include "viewer/imgui_draw.h"
 #include "viewer/open_files.h"
 #include "viewer/panel.h"
+#include "viewer/screen.h"
 #include "viewer/script.h"
 
 namespace pietra {
@@ -37,58 +36,6 @@ double secondsSince(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-template <auto kDestroy>
-struct Destroy {
-    template <class T>
-    void operator()(T* object) const {
-        kDestroy(object);
-    }
-};
-using Window = std::unique_ptr<SDL_Window, Destroy<SDL_DestroyWindow>>;
-using Renderer = std::unique_ptr<SDL_Renderer, Destroy<SDL_DestroyRenderer>>;
-using Texture = std::unique_ptr<SDL_Texture, Destroy<SDL_DestroyTexture>>;
-
-/// SDL and Dear ImGui, from beginning to end.
-class Toolkit {
-public:
-    explicit Toolkit(const PictureSize& size) {
-        SDL_SetHint(SDL_HINT_VIDEO_X11_NET_WM_BYPASS_COMPOSITOR, "0");
-        if (SDL_Init(SDL_INIT_VIDEO) != 0)
-            throw UsageError(fmt::format("no window can be opened: {}", SDL_GetError()));
-        window.reset(SDL_CreateWindow("Pietra", SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED,
-                                      size.width, size.height,
-                                      SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI));
-        if (window) renderer.reset(SDL_CreateRenderer(window.get(), -1, 0));
-        if (!renderer) throw UsageError(fmt::format("no window can be opened: {}", SDL_GetError()));
-        ImGui::CreateContext();
-        ImGui::GetIO().IniFilename = nullptr;
-        ImGui::StyleColorsDark();
-        ImGui_ImplSDL2_InitForSDLRenderer(window.get());
-        imgui.emplace(renderer.get());
-    }
-    ~Toolkit() {
-        if (renderer) {
-            imgui.reset();
-            ImGui_ImplSDL2_Shutdown();
-            ImGui::DestroyContext();
-        }
-        renderer.reset();
-        window.reset();
-        SDL_Quit();
-    }
-
-    PictureSize pictureSize() const {
-        PictureSize size;
-        SDL_GetRendererOutputSize(renderer.get(), &size.width, &size.height);
-        return {std::clamp(size.width, 16, kMaxPictureSide),
-                std::clamp(size.height, 16, kMaxPictureSide)};
-    }
-
-    Window window;
-    Renderer renderer;
-    std::optional<ImguiDraw> imgui;
-};
-
 /// A name that is not taken: `stem`-1.`ending` and so on, in the current folder.
 std::string freeName(const char* stem, const char* ending) {
     for (int i = 1;; ++i)
@@ -102,13 +49,15 @@ public:
     Viewer(OpenFiles& files, const ViewerSettings& settings)
         : files_(files),
           settings_(settings),
-          toolkit_(settings.size),
+          screen_(openScreen()),
           control_(wholeScene(Box3d{{Vec3d(0)}, {Vec3d(1)}})) {
         nothing_.converged = true;
         if (!settings.script.empty()) script_ = Script(settings.script);
         showModels();
         state_.pixels = settings.pixels;
         figures_.ram_bytes = settings.scene.ram_bytes;
+        figures_.vram_bytes = sink() != nullptr ? sink()->capacityBytes() : 0;
+        figures_.renderer = screen_->rendererName();
     }
 
     void run() {
@@ -120,6 +69,7 @@ public:
             takePicks();
             if (!ready()) drawScene();
             present();
+            screen_->swap();
             last_frame_ = secondsSince(start);
             if (!ready()) figures_.add(float(1e3 * last_frame_));
             record();
@@ -127,6 +77,8 @@ public:
     }
 
 private:
+    std::unique_ptr<Screen> openScreen();
+    PageSink* sink() const { return screen_->renderer().sink(); }
     CameraControl wholeScene(const Box3d& bounds) const;
     void showModels();
     void openWhatIsBuilt();
@@ -162,19 +114,14 @@ private:
     OpenFiles& files_;
     std::vector<const ModelReader*> models_;
     ViewerSettings settings_;
-    Toolkit toolkit_;
+    ViewState state_;
+    std::unique_ptr<Screen> screen_;
     std::optional<Scene> scene_;  // none as long as there are no models
     Frame nothing_;               // of no models
     const Frame* shown_ = nullptr;
     CameraControl control_;
     Script script_;
-    ViewState state_;
     FrameFigures figures_;
-    std::optional<Rasteriser> rasteriser_;
-    int rasteriser_samples_ = 0;
-    const Picture* picture_ = nullptr;
-    Texture texture_;
-    PictureSize texture_size_{0, 0};
     Vec3d light_ = ShadeSettings{}.light_direction;
     bool light_key_ = false;
     double motion_factor_ = 1;
@@ -192,9 +139,22 @@ private:
     int cursor_x_ = 0, cursor_y_ = 0;
 };
 
+std::unique_ptr<Screen> Viewer::openScreen() {
+    if (settings_.renderer == ViewerRenderer::kCpu) return openCpuScreen(settings_.size);
+    const bool insist = settings_.renderer == ViewerRenderer::kGl;
+    try {
+        return openGlScreen(settings_.size, settings_.vram_bytes, insist, settings_.gl_messages);
+    } catch (const UsageError& error) {
+        if (insist) throw;
+        state_.message = fmt::format("drawing with the processor: {}", error.what());
+        if (settings_.tell) settings_.tell(state_.message);
+        return openCpuScreen(settings_.size);
+    }
+}
+
 CameraControl Viewer::wholeScene(const Box3d& bounds) const {
     return {bounds, settings_.up,
-            standardCamera(StandardView::kFront, settings_.up, bounds, toolkit_.pictureSize())};
+            standardCamera(StandardView::kFront, settings_.up, bounds, screen_->size())};
 }
 
 /// The models that are open now; the camera stays where it is, but for the first ones.
@@ -204,12 +164,14 @@ void Viewer::showModels() {
     for (const Pick& pick : picks_) pick.point.wait();  // they read from models
     shown_ = nullptr;
     scene_.reset();  // two would need the memory twice
-    scene_.emplace(models, settings_.scene);
+    SceneSettings settings = settings_.scene;
+    settings.sink = sink();
+    scene_.emplace(models, settings);
     const Box3d bounds = boundsOf(models);
     if (models_.empty()) control_ = wholeScene(bounds);
     control_.setBounds(bounds);
     models_ = models;
-    SDL_SetWindowTitle(toolkit_.window.get(),
+    SDL_SetWindowTitle(screen_->window(),
                        models.size() == 1
                            ? fmt::format("{} - Pietra", models[0]->path()).c_str()
                            : fmt::format("{} models - Pietra", models.size()).c_str());
@@ -309,7 +271,7 @@ void Viewer::handleKey(SDL_Keycode key) {
             files_.acceptOffers();
             break;
         case SDLK_f:
-            control_.frame(toolkit_.pictureSize());
+            control_.frame(screen_->size());
             break;
         case SDLK_t:
             control_.setStyle(control_.style() == CameraControl::Style::kTurntable
@@ -378,18 +340,18 @@ void Viewer::handleDrag(const SDL_MouseMotionEvent& motion) {
 /// Window coordinates to pixels of the picture.
 Vec2d Viewer::pictureCursor() const {
     int width = 1, height = 1;
-    SDL_GetWindowSize(toolkit_.window.get(), &width, &height);
-    const PictureSize size = toolkit_.pictureSize();
+    SDL_GetWindowSize(screen_->window(), &width, &height);
+    const PictureSize size = screen_->size();
     return {double(cursor_x_) * size.width / width, double(cursor_y_) * size.height / height};
 }
 
 /// The surface in the picture there, if any.
 std::optional<Vec3d> Viewer::pointAt(int x, int y) const {
-    if (!picture_ || x < 0 || y < 0 || x >= picture_->size.width || y >= picture_->size.height)
-        return {};
-    const float depth = picture_->depth[picture_->index(x, y)];
+    const PictureSize size = screen_->size();
+    if (!drawn_ || x < 0 || y < 0 || x >= size.width || y >= size.height) return {};
+    const float depth = screen_->renderer().depthAt(x, y);
     if (!std::isfinite(depth)) return {};
-    return control_.pointUnder(x + 0.5, y + 0.5, double(depth), picture_->size);
+    return control_.pointUnder(x + 0.5, y + 0.5, double(depth), size);
 }
 
 void Viewer::handleClick(const SDL_MouseButtonEvent& button) {
@@ -439,7 +401,7 @@ void Viewer::takePicks() {
 
 void Viewer::zoomTo(int steps) {
     const Vec2d at = pictureCursor();
-    const PictureSize size = toolkit_.pictureSize();
+    const PictureSize size = screen_->size();
     const std::optional<Vec3d> surface = pointAt(int(at.x), int(at.y));
     control_.zoom(
         std::pow(kZoomStep, steps),
@@ -485,7 +447,7 @@ void Viewer::adaptToMotion() {
 
 void Viewer::drawScene() {
     adaptToMotion();
-    const PictureSize size = toolkit_.pictureSize();
+    const PictureSize size = screen_->size();
     if (!state_.frozen) frozen_camera_ = control_.camera();
     FrameRequest request;
     request.camera = frozen_camera_;
@@ -497,39 +459,28 @@ void Viewer::drawScene() {
     const Frame& frame = scene_ ? scene_->update(request) : nothing_;
     shown_ = &frame;
     const auto start = Clock::now();
-    const auto lattice = [&](size_t m) -> const Lattice& { return models_[m]->info().lattice; };
-    const Lattice first_lattice = models_.empty() ? Lattice{} : lattice(0);
-    const View first(control_.camera(), size, first_lattice);
-    if (!rasteriser_ || rasteriser_samples_ != state_.samples)
-        rasteriser_.emplace(first, first_lattice, state_.samples, shade());
-    else
-        rasteriser_->restart(first, first_lattice, shade());
-    rasteriser_samples_ = state_.samples;
+    const Lattice none;
     std::vector<ModelPatches> list;
-    for (size_t m = 0; m < models_.size(); ++m)
-        list.push_back(
-            {View(control_.camera(), size, lattice(m)), &lattice(m), frame.models[m].patches});
-    rasteriser_->draw(list, request.culling.occlusion);
-    picture_ = &rasteriser_->finish();
+    for (size_t m = 0; m < models_.size(); ++m) {
+        const Lattice& lattice = models_[m]->info().lattice;
+        list.push_back({View(control_.camera(), size, lattice), &lattice, frame.models[m].patches});
+    }
+    if (list.empty()) list.push_back({View(control_.camera(), size, none), &none, {}});
+    screen_->renderer().draw(list, {shade(), state_.samples, request.culling.occlusion});
     figures_.draw_ms = 1e3 * secondsSince(start);
     figures_.tolerance_px = frame.tolerance_px;
     figures_.converged = frame.converged && motion_factor_ == 1;
     figures_.triangles = frame.triangles;
     figures_.patches = frame.patch_count;
+    figures_.gpu_ms = screen_->renderer().gpuMs();
     figures_.resident_bytes = frame.resident_bytes;
+    figures_.device_bytes = frame.device_bytes;
     figures_.bytes_read = frame.bytes_read;
     drawn_ = true;
-    if (texture_size_.width != size.width || texture_size_.height != size.height) {
-        texture_.reset(SDL_CreateTexture(toolkit_.renderer.get(), SDL_PIXELFORMAT_RGBA32,
-                                         SDL_TEXTUREACCESS_STREAMING, size.width, size.height));
-        texture_size_ = size;
-    }
-    SDL_UpdateTexture(texture_.get(), nullptr, picture_->colour.data(),
-                      size.width * int(sizeof(Rgba8)));
 }
 
 void Viewer::present() {
-    ImGui_ImplSDL2_NewFrame();
+    screen_->beginFrame();
     ImGui::NewFrame();
     const ViewState before = state_;
     drawPanel(state_, figures_, control_, faults());
@@ -544,10 +495,7 @@ void Viewer::present() {
         before.samples != state_.samples || before.frozen != state_.frozen)
         touch();
     ImGui::Render();
-    SDL_RenderClear(toolkit_.renderer.get());
-    SDL_RenderCopy(toolkit_.renderer.get(), texture_.get(), nullptr, nullptr);
-    toolkit_.imgui->draw(*ImGui::GetDrawData());
-    SDL_RenderPresent(toolkit_.renderer.get());
+    screen_->show(*ImGui::GetDrawData());
 }
 
 std::vector<std::string> Viewer::faults() const {
@@ -557,10 +505,9 @@ std::vector<std::string> Viewer::faults() const {
 }
 
 void Viewer::savePicture() {
-    if (!picture_) return;
     const std::string name = freeName("pietra", "png");
     try {
-        writePng(*picture_, name, false);
+        writePng(screen_->renderer().picture(), name, false);
         state_.message = fmt::format("saved {}", name);
     } catch (const std::exception& error) {
         state_.message = error.what();
@@ -570,15 +517,7 @@ void Viewer::savePicture() {
 /// The window as it is seen, panels and all.
 void Viewer::saveWindow(const std::string& file) {
     present();
-    Picture picture;
-    picture.size = toolkit_.pictureSize();
-    picture.colour.resize(picture.pixelCount());
-    SDL_RenderCopy(toolkit_.renderer.get(), texture_.get(), nullptr, nullptr);
-    toolkit_.imgui->draw(*ImGui::GetDrawData());
-    if (SDL_RenderReadPixels(toolkit_.renderer.get(), nullptr, SDL_PIXELFORMAT_RGBA32,
-                             picture.colour.data(), picture.size.width * int(sizeof(Rgba8))) != 0)
-        throw UsageError(fmt::format("the window cannot be read: {}", SDL_GetError()));
-    writePng(picture, file, true);
+    writePng(screen_->read(), file, true);
 }
 
 void Viewer::toggleRecording() {

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include "apps/pietra/draw_options.h"
 #include "apps/pietra/limits.h"
+#include "apps/pietra/logging.h"
 #include "apps/pietra/verbs.h"
 #include "base/error.h"
 #include "base/parallel.h"
@@ -25,10 +27,10 @@ private:
     std::vector<std::string> files_;
     PictureSize size_{1280, 800};
     double pixels_ = 1;
-    std::string renderer_ = "cpu";
+    std::string renderer_ = "auto";
     std::string up_ = "z";
     std::string script_;
-    uint64_t ram_ = uint64_t(1) << 30;
+    uint64_t ram_ = uint64_t(1) << 30, vram_ = uint64_t(1) << 30;
     std::optional<uint64_t> jobs_;
 };
 
@@ -52,9 +54,11 @@ void ViewVerb::declare(OptionSet& options) {
     options.files("FILE", files_, "Models, or meshes.").require();
     options.pictureSize("--size", size_, "Of the window, in pixels.");
     options.number("--pixels", "T", pixels_, {.min = 0.25, .max = 64}, "Tolerance in pixels.");
-    options.choice("--renderer", renderer_, {"cpu", "gl"}, "What draws.");
+    options.choice("--renderer", renderer_, {"auto", "gl", "cpu"},
+                   "What draws; auto: OpenGL where a graphics card does it, else the processor.");
     options.choice("--up", up_, {"y", "z"}, "Which axis points up.");
     options.size("--ram", ram_, "Most memory for what is loaded.");
+    declareVram(options, vram_);
     options.text(
         "--script", "FILE", script_,
         "Do what the file says as if a user did, a command a line: wait, key F, drag left "
@@ -63,9 +67,7 @@ void ViewVerb::declare(OptionSet& options) {
         .defaultsTo("all cores");
 }
 
-int ViewVerb::run(const RunContext&) {
-    if (renderer_ == "gl")
-        throw UsageError("--renderer gl: the viewer draws on the processor so far; use cpu");
+int ViewVerb::run(const RunContext& context) {
     const ThreadLimit threads(Limits{{}, jobs_}.threads());
     for (const std::string& file : files_)
         if (!isModelFile(file)) checkMeshFormat(file);
@@ -74,11 +76,20 @@ int ViewVerb::run(const RunContext&) {
     settings.pixels = pixels_;
     settings.up = up_ == "y" ? UpAxis::kY : UpAxis::kZ;
     settings.scene.ram_bytes = size_t(ram_);
+    settings.vram_bytes = size_t(vram_);
+    settings.renderer = renderer_ == "auto" ? ViewerRenderer::kAuto
+                        : renderer_ == "gl" ? ViewerRenderer::kGl
+                                            : ViewerRenderer::kCpu;
+    settings.tell = logInfo;
+    if (context.common.log_level == "debug")
+        settings.gl_messages = [](const GlMessage& message) {
+            logWarning(fmt::format("OpenGL: {}", message.text));
+        };
     settings.script = script_;
     try {
         runViewer(files_, settings);
     } catch (const MemoryError& error) {
-        throw MemoryError(fmt::format("--ram {}: {}", formatBytes(ram_), error.what()));
+        throw MemoryError(memoryMessage(ram_, renderer_ == "cpu" ? 0 : vram_, error));
     }
     return 0;
 }
