@@ -8,6 +8,7 @@
 
 #include "base/check.h"
 #include "render/live/gl_live.h"
+#include "runtime/patch_reader.h"
 
 namespace pietra {
 namespace {
@@ -54,8 +55,12 @@ private:
     std::unique_ptr<LiveRenderer> makeRenderer() const {
         if (settings_.draw == Draw::kNothing) return nullptr;
         if (settings_.draw == Draw::kCpu) return makeRasterLive();
+        // More than all pages take, the ring beside them, need not be there.
+        size_t all = size_t(4) << 20;
+        for (const ModelReader* model : models_)
+            for (const size_t page : decodedPageBytes(*model)) all += page + page / 6;
         return std::make_unique<GlLive>(GlContext::headless(), settings_.size,
-                                        settings_.vram_bytes);
+                                        std::min(settings_.vram_bytes, all));
     }
 
     SceneSettings sceneSettings() const {

@@ -90,6 +90,9 @@ int ViewVerb::run(const RunContext& context) {
         runViewer(files_, settings);
     } catch (const MemoryError& error) {
         throw MemoryError(memoryMessage(ram_, renderer_ == "cpu" ? 0 : vram_, error));
+    } catch (const UsageError& error) {
+        if (renderer_ != "gl") throw;
+        throw UsageError(fmt::format("--renderer {}: {}", renderer_, error.what()));
     }
     return 0;
 }
