@@ -330,6 +330,48 @@ class Shown(VerbTest):
         self.assertRefused(["bench", "statue.pietra", "--path", "none.json"], 4,
                            "none.json: cannot open: No such file or directory")
 
+    def skip_without_opengl(self, run):
+        if "there is no OpenGL 4.5" in run.stderr or "no window can be opened" in run.stderr:
+            self.skipTest(run.stderr)
+        self.assertEqual(run.returncode, 0, run.stderr)
+
+    def test_bench_by_opengl(self):
+        fly = ["bench", "statue.pietra", "statue.pietra", "--path", "jumps", "--frames", "12",
+               "--size", "160x120", "--renderer", "gl", "--report", "-"]
+        run = self.run_pietra(*fly, "--vram", "2M", "--log-level", "debug")
+        self.skip_without_opengl(run)
+        self.assertNotIn("OpenGL:", run.stderr)
+        r = json.loads(run.stdout)
+        self.assertEqual(r["renderer"], "gl")
+        for frame in r["frames"]:
+            self.assertTrue(0 < frame["resident_bytes"]["vram"] <= 2 << 20, frame)
+            self.assertGreater(frame["gpu_ms"], 0)
+        self.assertGreater(r["summary"]["overhead_ratio"], 0)
+        self.assertRefused(fly + ["--vram", "1K"], 5, "--ram 1.0 GiB, --vram 1.0 KiB: OpenGL needs "
+                           "512 KiB of graphics memory")
+
+    def test_view_by_opengl(self):
+        self.write("s.txt", "key Tab\nwait\nscreenshot a.png\ndrag left 200 150 300 180\n"
+                   "wheel 3 200 150\nkey 5\nwait\nscreenshot b.png\nkey A\ndouble 200 150\nwait\n"
+                   "screenshot c.png\nquit\n")
+        screen = {"SDL_VIDEODRIVER": "offscreen", "ASAN_OPTIONS": "detect_leaks=0"}
+        look = ["view", "statue.pietra", "--size", "400x300", "--vram", "16M", "--script", "s.txt"]
+        for renderer in ("gl", "cpu"):
+            run = self.run_pietra(*look, "--log-level", "debug", "--renderer", renderer, env=screen)
+            self.skip_without_opengl(run)
+            self.assertEqual((run.stdout, run.stderr), ("", ""))
+            for name in "abc":
+                os.rename(self.path(f"{name}.png"), self.path(f"{renderer}_{name}.png"))
+        for name in "abc":
+            self.report("compare", f"cpu_{name}.png", f"gl_{name}.png", "--json", "--max-shade", "2")
+        none = dict(screen, SDL_VIDEODRIVER="dummy")  # has no OpenGL
+        run = self.run_pietra(*look, env=none)
+        self.assertEqual(run.returncode, 0)
+        self.assertTrue(run.stderr.startswith("pietra: drawing with the processor: "), run.stderr)
+        run = self.run_pietra(*look, "--renderer", "gl", env=none)
+        self.assertEqual(run.returncode, 2)
+        self.assertTrue(run.stderr.startswith("pietra: --renderer gl: "), run.stderr)
+
     def test_view_does_as_a_script_says(self):
         self.write("s.txt", "# turn it\nwait\nscreenshot a.png\ndrag left 200 150 300 180\n"
                    "wheel 3 200 150\nkey 5\nwait\nscreenshot b.png\nquit\n")
@@ -349,7 +391,8 @@ class Shown(VerbTest):
             self.assertEqual(self.report("info", "torus.pietra", "--json")["input"]["triangles"], 1920)
             os.remove(self.path("torus.pietra"))
         self.write("bad.txt", "wait\njump\n")
-        run = self.run_pietra("view", "statue.pietra", "--script", "bad.txt", env=screen)
+        run = self.run_pietra("view", "statue.pietra", "--renderer", "cpu", "--script", "bad.txt",
+                              env=screen)
         self.assertEqual((run.returncode, run.stderr),
                          (3, "pietra: bad.txt: line 2: 'jump' is no command\n"))
 

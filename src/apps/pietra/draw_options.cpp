@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/pietra/logging.h"
 #include "base/text.h"
 
 namespace pietra {
@@ -19,6 +20,11 @@ void declareVram(OptionSet& options, uint64_t& bytes) {
     options.size("--vram", bytes,
                  "Most graphics memory for what is loaded, with --renderer gl: what is drawn must "
                  "fit into it, and --ram only bounds what is kept beside it.");
+}
+
+GlMessageHandler glMessages(const CommonOptions& common) {
+    if (common.log_level != "debug") return {};
+    return [](const GlMessage& message) { logWarning(fmt::format("OpenGL: {}", message.text)); };
 }
 
 std::string memoryMessage(uint64_t ram, uint64_t vram, const MemoryError& error) {

@@ -3,9 +3,10 @@
 
 #include <string>
 
-#include "apps/pietra/option_set.h"
+#include "apps/pietra/verb.h"
 #include "base/error.h"
 #include "multires/cut.h"
+#include "render/gl/context.h"
 
 namespace pietra {
 
@@ -21,6 +22,8 @@ private:
 
 /// --vram.
 void declareVram(OptionSet& options, uint64_t& bytes);
+/// With --log-level debug: has what OpenGL says logged; else empty.
+GlMessageHandler glMessages(const CommonOptions& common);
 /// Of a scene that does not fit the limits given; `vram` is 0 where there is none.
 std::string memoryMessage(uint64_t ram, uint64_t vram, const MemoryError& error);
 

@@ -59,7 +59,7 @@ private:
         size_t all = size_t(4) << 20;
         for (const ModelReader* model : models_)
             for (const size_t page : decodedPageBytes(*model)) all += page + page / 6;
-        return std::make_unique<GlLive>(GlContext::headless(), settings_.size,
+        return std::make_unique<GlLive>(GlContext::headless(settings_.gl_messages), settings_.size,
                                         std::min(settings_.vram_bytes, all));
     }
 

@@ -4,6 +4,7 @@
 #include <functional>
 #include <vector>
 
+#include "render/gl/context.h"
 #include "render/shading.h"
 #include "runtime/camera_path.h"
 #include "runtime/scene.h"
@@ -19,6 +20,7 @@ struct FlightSettings {
     int samples = 1;
     enum class Draw { kNothing, kCpu, kGl } draw = Draw::kCpu;
     size_t vram_bytes = size_t(1) << 30;  ///< of graphics memory, for pages
+    GlMessageHandler gl_messages;         ///< as of GlContext
     /// In real time: no frame is shown before its time on the path. Else as fast as it can.
     bool real_time = false;
     SceneSettings scene;

@@ -213,7 +213,8 @@ int BenchVerb::run(const RunContext& context) {
         for (const std::string& file : files_) dropSystemCache(file);
     const ModelFiles files(files_);
     const CameraPath camera_path = path(files);
-    const FlightSettings flight = settings(camera_path);
+    FlightSettings flight = settings(camera_path);
+    flight.gl_messages = glMessages(context.common);
     context.progress.setStages(1);
     context.progress.beginStage("fly", uint64_t(flight.frames));
     FlightRecord record;

@@ -81,10 +81,7 @@ int ViewVerb::run(const RunContext& context) {
                         : renderer_ == "gl" ? ViewerRenderer::kGl
                                             : ViewerRenderer::kCpu;
     settings.tell = logInfo;
-    if (context.common.log_level == "debug")
-        settings.gl_messages = [](const GlMessage& message) {
-            logWarning(fmt::format("OpenGL: {}", message.text));
-        };
+    settings.gl_messages = glMessages(context.common);
     settings.script = script_;
     try {
         runViewer(files_, settings);
