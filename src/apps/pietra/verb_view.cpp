@@ -40,7 +40,8 @@ VerbText ViewVerb::text() const {
         "look at models in a window",
         {"FILE... [options]"},
         {"Opens a window at once, and shows the models as finely as --pixels asks for. What has "
-         "not been loaded yet is drawn coarser, without holes. No graphics card is needed.",
+         "not been loaded yet is drawn coarser, without holes. A graphics card with OpenGL 4.5 draws "
+         "where there is one, else the processor.",
          "A mesh is offered to be built first: its model is put beside it, or into the user's "
          "cache "
          "where that folder cannot be written. Files dropped on the window are added, meshes built "
