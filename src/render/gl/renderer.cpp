@@ -31,6 +31,12 @@ size_t ringBytes(size_t vram_bytes) {
     return std::min(vram_bytes / 8, kLargestRing) / 2048 * 2048;
 }
 
+/// What is left beside the ring and what the culler keeps: two words a slot, two commands a draw.
+size_t pageBytes(size_t vram_bytes) {
+    const size_t ring = ringBytes(vram_bytes), rest = vram_bytes - ring;
+    return rest - rest / (OcclusionCuller::kSlotBytes / 8) - ring / 16;
+}
+
 bool isLlvmpipe() {
     const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
     return name != nullptr && std::string_view(name).find("llvmpipe") != std::string_view::npos;
@@ -125,7 +131,7 @@ struct GlRenderer::State {
 
 GlRenderer::State::State(const PictureSize& size, int with_samples, size_t vram_bytes)
     : ring(ringBytes(vram_bytes)),
-      pages(vram_bytes - ringBytes(vram_bytes), ring),
+      pages(pageBytes(vram_bytes), ring),
       targets(size, with_samples),
       samples(with_samples),
       scalar_colours(makeScalarColours()),

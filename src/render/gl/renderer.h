@@ -9,9 +9,10 @@
 // the one drawn first wins, within a draw() in no particular order.
 //
 // A picture: begin(), then uploads, draws and releases in any order, then readPicture() or
-// present(). Memory for pages is `vram_bytes`, an eighth of it the ring for uploads; targets come
-// on top: 8 bytes a sample and 8 a pixel. All memory is taken and all shaders are compiled when a
-// renderer is made; a frame does neither, nor does it wait, as long as it uploads what mayUpload().
+// present(). Of `vram_bytes` at most an eighth is the ring for uploads and some 4 in a hundred
+// serve culling; pages have the rest. Targets come on top: 8 bytes a sample and 8 a pixel. All
+// memory is taken and all shaders are compiled when a renderer is made; a frame does neither, nor
+// does it wait, as long as it uploads what mayUpload().
 //
 // The context must be current whenever anything here is called, also on destruction. Other state of
 // the context than what is bound does not matter, and clip control, culling and tests are left as

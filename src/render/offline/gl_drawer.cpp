@@ -96,8 +96,8 @@ std::unique_ptr<BatchDrawer> makeGlDrawer(const View& view, const Lattice& latti
 }
 
 size_t leastGlBatchBytes(size_t largest_page_bytes) {
-    // A page takes less there than decoded, but for alignment; an eighth is the ring's.
-    return std::max(kLeastVramBytes, (largest_page_bytes + 4096) * 8 / 7 + 4096);
+    // A page takes less there than decoded, but for alignment; a sixth is not for pages.
+    return std::max(kLeastVramBytes, (largest_page_bytes + 4096) * 6 / 5 + 4096);
 }
 
 }  // namespace pietra
