@@ -48,7 +48,7 @@ private:
     PictureSize size_;
     Vec3d eye_, right_, up_, back_;
     double focal_;
-    double error_scale_;         // focal / cos^2 of the picture's corner
+    double error_scale_;  // focal / cos^2 of the picture's corner
     std::array<Vec3d, 4> side_;  // inward unit normals of the frustum's sides, through the eye
 };
 

@@ -95,7 +95,7 @@ private:
     void touch() { touched_ = Clock::now(); }
     bool moving() const { return secondsSince(touched_) < kAtRestSeconds; }
     /// The picture on the screen is the one asked for.
-    bool ready() const { return drawn_ && figures_.converged && !moving(); }
+    bool ready() const { return picture_size_.width > 0 && figures_.converged && !moving(); }
 
     void drawScene();
     ShadeSettings shade() const;
@@ -126,7 +126,8 @@ private:
     bool light_key_ = false;
     double motion_factor_ = 1;
     double last_frame_ = 0;
-    bool drawn_ = false, quit_ = false;
+    PictureSize picture_size_{0, 0};  // of the last one drawn
+    bool quit_ = false;
     struct Pick {
         std::future<Vec3d> point;
         int measured;  // which end of the distance, or -1
@@ -347,8 +348,8 @@ Vec2d Viewer::pictureCursor() const {
 
 /// The surface in the picture there, if any.
 std::optional<Vec3d> Viewer::pointAt(int x, int y) const {
-    const PictureSize size = screen_->size();
-    if (!drawn_ || x < 0 || y < 0 || x >= size.width || y >= size.height) return {};
+    const PictureSize size = picture_size_;  // the window may have another by now
+    if (x < 0 || y < 0 || x >= size.width || y >= size.height) return {};
     const float depth = screen_->renderer().depthAt(x, y);
     if (!std::isfinite(depth)) return {};
     return control_.pointUnder(x + 0.5, y + 0.5, double(depth), size);
@@ -476,7 +477,7 @@ void Viewer::drawScene() {
     figures_.resident_bytes = frame.resident_bytes;
     figures_.device_bytes = frame.device_bytes;
     figures_.bytes_read = frame.bytes_read;
-    drawn_ = true;
+    picture_size_ = size;
 }
 
 void Viewer::present() {
@@ -505,6 +506,7 @@ std::vector<std::string> Viewer::faults() const {
 }
 
 void Viewer::savePicture() {
+    if (picture_size_.width == 0) return;
     const std::string name = freeName("pietra", "png");
     try {
         writePng(screen_->renderer().picture(), name, false);
