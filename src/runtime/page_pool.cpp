@@ -132,9 +132,10 @@ bool PagePool::tryArrive(const PageKey& key, size_t& upload_left) {
 bool PagePool::enter(const PageKey& key) {
     SceneModel& model = modelOf(key);
     if (sink_ != nullptr) {
+        const size_t before = sink_->usedBytes();
         if (!sink_->upload(key, model.copies[key.page])) return false;
-        model.drawn_bytes[key.page] = sink_->usedBytes() - device_.used;
         device_.used = sink_->usedBytes();
+        model.drawn_bytes[key.page] = device_.used - before;
     }
     model.residency.arrive(key.page);
     model.last_used[key.page] = frame_;
