@@ -265,6 +265,11 @@ private:
                 first = last;
             }
         }
+        for (uint32_t t = 0; t < mesh().triangle.size(); ++t) {
+            const Triangle& f = mesh().triangle[t];
+            components.setVolume(
+                t, sixfoldVolume(position_[f[0]], position_[f[1]], position_[f[2]]));
+        }
         out_.bucket.components = components.finish();
     }
 

@@ -13,17 +13,22 @@ void LocalComponents::share(uint32_t triangle, uint64_t low, uint64_t high, bool
 
 BucketComponents LocalComponents::finish() {
     const uint32_t count = uint32_t(flags_.size());
-    for (uint32_t t = 0; t < count; ++t)
-        if (flags_[t]) flags_[sets_.root(t)] |= flags_[t];
+    for (uint32_t t = 0; t < count; ++t) {
+        const uint32_t root = sets_.root(t);
+        flags_[root] |= flags_[t];
+        if (root != t) volume_[root] += volume_[t];
+    }
     BucketComponents out;
     std::vector<uint32_t> number(shared_uses_.empty() ? 0 : count);  // of roots that are shared
     for (uint32_t t = 0; t < count; ++t) {
         const uint32_t root = sets_.root(t);
-        uint32_t component = flags_[root] & kOpen ? kOpenComponent : kClosedComponent;
+        const bool open = (flags_[root] & kOpen) != 0 || volume_[root] < 0;
+        uint32_t component = open ? kOpenComponent : kClosedComponent;
         if (flags_[root] & kShared) {
             if (root == t) {  // the least of its set: seen before all others
                 number[root] = uint32_t(out.open.size());
                 out.open.push_back(flags_[root] & kOpen);
+                out.volume.push_back(volume_[root]);
             }
             component = number[root];
         }
@@ -47,6 +52,7 @@ void ComponentTable::add(BucketComponents& bucket) {
         CHECK_LT(open_.size() + bucket.open.size(), size_t(kOpenComponent));
         base = uint32_t(open_.size());
         open_.insert(open_.end(), bucket.open.begin(), bucket.open.end());
+        volume_.insert(volume_.end(), bucket.volume.begin(), bucket.volume.end());
     }
     for (ComponentRun& run : bucket.runs)
         if (run.component < kOpenComponent) run.component += base;
@@ -74,9 +80,16 @@ void ComponentTable::resolve() {
             first = last;
         }
     });
-    for (uint32_t i = 0; i < open_.size(); ++i)
-        if (open_[i]) open_[sets_.root(i)] = 1;
-    for (uint32_t i = 0; i < open_.size(); ++i) open_[i] = open_[sets_.root(i)];
+    for (uint32_t i = 0; i < open_.size(); ++i) {
+        const uint32_t root = sets_.root(i);
+        open_[root] |= open_[i];
+        if (root != i) volume_[root] += volume_[i];
+    }
+    for (uint32_t i = 0; i < open_.size(); ++i) {
+        const uint32_t root = sets_.root(i);
+        open_[i] = open_[root] | uint8_t(volume_[root] < 0);
+    }
+    volume_ = {};
     // What went to a file lay there beside the other temporary data.
     space_.add(uses_->spilledBytes());
     space_.remove(uses_->spilledBytes());

@@ -1,7 +1,8 @@
 #pragma once
 // Which triangles belong to closed, consistently oriented components: those that hang together over
-// edges, each of which is used exactly twice, once in either direction. Only these have a back that
-// nobody sees.
+// edges, each of which is used exactly twice, once in either direction, and are not inside out.
+// Only these have a back that nobody sees. Inside out is what encloses a negative volume: it may be
+// a cavity, whose back nobody sees either, or a mesh whose triangles are all turned over.
 //
 // A bucket finds the components of its own triangles by union-find (LocalComponents). Most are
 // settled there: dust takes no memory outside its bucket. A component with an edge that other
@@ -9,7 +10,7 @@
 // it makes of such an edge; these uses wait in a SpillTable. resolve() brings the uses of one edge
 // together: two in opposite directions unite two components, anything else makes them all open.
 //
-// What comes out depends on the triangles alone, not on buckets, order or threads. Memory: 5 bytes
+// What comes out depends on the triangles alone, not on buckets, order or threads. Memory: 21 bytes
 // a numbered component, and that of the SpillTable.
 
 #include <cstdint>
@@ -23,11 +24,23 @@
 #include "base/hash.h"
 #include "extmem/spill.h"
 #include "extmem/spill_table.h"
+#include "geometry/lattice.h"
 
 namespace pietra {
 
 /// Settled within one bucket; all else is a number of the table.
 inline constexpr uint32_t kClosedComponent = 0xffffffffu, kOpenComponent = 0xfffffffeu;
+
+/// Sums of sixfoldVolume(), exact.
+using Volume = __int128;
+
+/// Six times the volume of a tetrahedron, from the middle of the lattice to a triangle: over a
+/// closed surface the sum is six times what it encloses.
+inline int64_t sixfoldVolume(const Vec3i& a, const Vec3i& b, const Vec3i& c) {
+    constexpr int64_t kMiddle = int64_t(1) << (kLatticeBits - 1);
+    const Vec3l p = Vec3l(a) - kMiddle, n = crossInteger(Vec3l(b) - kMiddle, Vec3l(c) - kMiddle);
+    return p.x * n.x + p.y * n.y + p.z * n.z;
+}
 
 /// The triangles from `first` to the next run belong to `component`.
 struct ComponentRun {
@@ -53,18 +66,21 @@ struct SharedEdgeUse {
 struct BucketComponents {
     std::vector<ComponentRun> runs;          ///< in order; the first begins at triangle 0
     std::vector<uint8_t> open;               ///< one a numbered component: known not to be closed
+    std::vector<Volume> volume;              ///< likewise: of its triangles
     std::vector<SharedEdgeUse> shared_uses;  ///< of the numbered components
 };
 
 /// Gathers what is known of the edges of one bucket's triangles.
 class LocalComponents {
 public:
-    explicit LocalComponents(size_t triangles) : sets_(triangles), flags_(triangles, 0) {}
+    explicit LocalComponents(size_t triangles)
+        : sets_(triangles), flags_(triangles, 0), volume_(triangles, 0) {}
 
     /// Two triangles share an edge.
     void unite(uint32_t a, uint32_t b) { sets_.unite(a, b); }
     /// An edge of the triangle is not used twice, once in either direction.
     void markOpen(uint32_t triangle) { flags_[triangle] |= kOpen; }
+    void setVolume(uint32_t triangle, int64_t sixfold) { volume_[triangle] = sixfold; }
     /// Other buckets may use an edge of the triangle.
     void share(uint32_t triangle, uint64_t low, uint64_t high, bool forward);
 
@@ -75,6 +91,7 @@ private:
     enum : uint8_t { kOpen = 1, kShared = 2 };
     DisjointSets sets_;
     std::vector<uint8_t> flags_;  // per triangle; in the end, that of a set is its root's
+    std::vector<Volume> volume_;  // likewise
     std::vector<SharedEdgeUse> shared_uses_;  // .component: the triangle, until finish()
 };
 
@@ -100,6 +117,7 @@ private:
     std::mutex mutex_;
     DisjointSets sets_;
     std::vector<uint8_t> open_;
+    std::vector<Volume> volume_;
     std::optional<SpillTable<SharedEdgeUse>> uses_;
 };
 

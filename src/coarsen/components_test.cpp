@@ -77,6 +77,11 @@ TestMesh dust(int count, unsigned seed) {
     return mesh;
 }
 
+TestMesh insideOut(TestMesh mesh) {
+    for (Index& triangle : mesh.triangles) flip(triangle);
+    return mesh;
+}
+
 /// All in one: closed and not, large and small, touching in a point and along an edge.
 TestMesh mixture() {
     TestMesh mesh;
@@ -88,6 +93,8 @@ TestMesh mixture() {
     TestMesh flipped = torus(30, 10);
     flip(flipped.triangles[77]);
     append(mesh, flipped, {0, 0, 6});
+    append(mesh, insideOut(torus(30, 10)), {0, 0, 9});
+    append(mesh, insideOut(dust(60, 2)), {-5, -5, 8});
     for (int i = 0; i < 30; ++i) {  // each touches the next in a point: all are closed
         append(mesh, tetrahedron(0.5), {-8 + 0.5 * i, -8, 5});
     }
@@ -107,7 +114,7 @@ Corners cornersOf(const Mesh& mesh, size_t t) {
     return key;
 }
 
-/// For each triangle kept, by its sorted corners: its component is closed.
+/// For each triangle kept, by its sorted corners: its component is closed, and not inside out.
 std::map<Corners, bool> truthOf(const std::vector<Corners>& triangles) {
     struct Use {
         uint32_t triangle;
@@ -135,11 +142,16 @@ std::map<Corners, bool> truthOf(const std::vector<Corners>& triangles) {
     for (const auto& [edge, uses] : edges)
         if (uses.size() != 2 || uses[0].forward == uses[1].forward)
             open[label[uses[0].triangle]] = true;
+    std::vector<double> volume(triangles.size(), 0);
+    for (size_t t = 0; t < triangles.size(); ++t) {
+        const auto corner = [&](size_t k) { return Vec3d(latticePoint(triangles[t][k])); };
+        volume[label[t]] += glm::dot(corner(0), glm::cross(corner(1), corner(2)));
+    }
     std::map<Corners, bool> closed;
     for (size_t t = 0; t < triangles.size(); ++t) {
         Corners key = triangles[t];
         std::sort(key.begin(), key.end());
-        closed[key] = !open[label[t]];
+        closed[key] = !open[label[t]] && volume[label[t]] > 0;
     }
     return closed;
 }
@@ -210,6 +222,11 @@ TEST_F(ComponentsTest, oneTriangleTurnedOverOpensAllOfItsComponent) {
     flip(mesh.triangles[500]);
     for (const uint64_t bucket : {30, 100000})
         EXPECT_EQ(checkLeaves(build(mesh, bucket, 50)).closed, 0);
+}
+
+TEST_F(ComponentsTest, whatIsInsideOutIsNotClosed) {
+    for (const uint64_t bucket : {30, 100000})
+        EXPECT_EQ(checkLeaves(build(insideOut(torus(40, 16)), bucket, 50)).closed, 0);
 }
 
 TEST_F(ComponentsTest, aDoubledTriangleCountsOnce) {

@@ -245,6 +245,15 @@ class Shown(VerbTest):
                 shown("both.png", "--cull", "none", "--two-sided")
                 self.report("compare", "none.png", "both.png", "--json", "--max-px", "1")
 
+    def test_a_closed_mesh_that_is_inside_out_is_seen_from_outside(self):
+        write_torus(self.path("torus.ply"), 60, 30)
+        vertices, triangles = read_floats(self.read("torus.ply"))
+        self.write("turned.ply", mesh_text(vertices, [(a, c, b) for a, b, c in triangles]))
+        for name in ("torus", "turned"):
+            self.report("build", f"{name}.ply", "-o", f"{name}.pietra", "--report", "-")
+            self.render(f"{name}.png", "--pixels", "0", models=[f"{name}.pietra"])
+        self.report("compare", "torus.png", "turned.png", "--json", "--max-px", "1")
+
     def test_from_within_a_part_that_shares_its_nodes_nothing_is_culled(self):
         # A closed tube in an open one that ends before it does: few nodes hold the closed one alone.
         around, vertices, triangles = 24, [], []
