@@ -91,6 +91,7 @@ TEST_F(OfflineTest, NeitherMemoryNorThreadsChangeThePicture) {
     settings.pixels = 0;
     settings.shade.show = Show::kTriangles;
     const Picture picture = terrain.draw(settings).picture;
+    settings.culling.occlusion = true;  // in each batch, by what the ones before left
     const OfflineSettings tight = smallest(settings, terrain);
     EXPECT_LT(tight.memory_bytes, settings.memory_bytes / 100);
     for (const int jobs : {1, 2, 7}) {
@@ -108,7 +109,7 @@ TEST_F(OfflineTest, CullingChangesNoPixel) {
     OfflineSettings settings;
     settings.pixels = 0;
     const OfflinePicture all = terrain.draw(settings);
-    settings.culling = {.frustum = true, .cone = true, .contribution = true};
+    settings.culling = {.frustum = true, .cone = true, .contribution = true, .occlusion = true};
     const OfflinePicture culled = terrain.draw(settings);
     EXPECT_LT(culled.statistics.triangles, all.statistics.triangles);
     EXPECT_EQ(culled.picture.colour, all.picture.colour);
@@ -117,9 +118,13 @@ TEST_F(OfflineTest, CullingChangesNoPixel) {
 
 TEST_F(OfflineTest, ModelsOnDifferentLatticesShareAScene) {
     const Terrain near(writeTerrain("a", {0, 0, 0})), far(writeTerrain("b", {0, 0, -3}));
-    const OfflineSettings settings;
+    OfflineSettings settings;
     const OfflinePicture one = near.draw(settings);
     const OfflinePicture both = near.draw(settings, {&far.reader, &near.reader});
+    settings.culling.occlusion = true;
+    const OfflinePicture unhidden = near.draw(settings, {&far.reader, &near.reader});
+    EXPECT_EQ(unhidden.picture.colour, both.picture.colour);
+    EXPECT_EQ(unhidden.picture.depth, both.picture.depth);
     EXPECT_GT(both.statistics.triangles, one.statistics.triangles);
     EXPECT_GT(both.statistics.pixels_covered, one.statistics.pixels_covered);
     size_t same = 0;

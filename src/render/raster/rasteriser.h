@@ -67,9 +67,9 @@ public:
     /// Draws, and shades what is visible so far: the meshes may vanish afterwards. At most 2^32 - 2
     /// triangles a call.
     void draw(std::span<const DrawPatch> patches);
-    /// Draws the models, not empty, as one after the other; the last one stays set. Patches that
-    /// are hidden, by what is drawn already or by each other, may be left out: this changes no
-    /// pixel, and costs next to nothing where none are.
+    /// Draws the models as one after the other; the last one stays set. Patches that are hidden, by
+    /// what is drawn already or by each other, may be left out: this changes no pixel, and costs
+    /// next to nothing where none are.
     void draw(std::span<const ModelPatches> models, bool leave_out_hidden);
     /// Completes the picture, which is valid until restart(); nothing can be drawn in between.
     const Picture& finish();
