@@ -350,7 +350,7 @@ TEST_F(ComponentsTest, coarserCellsAreClosedUnlessOpenOrClustered) {
     const uint32_t count = uint32_t(closed.mesh.triangleCount());
     DiamondInput input;
     input.children = {{store.put(closed)}, {store.put(open)}, {store.put(sponge(3, 200000))}};
-    DiamondWorker worker(0, 0);
+    DiamondWorker worker(0, {});
     for (const bool cluster : {false, true}) {
         input.quota = {cluster ? 50 : count - 10, count - 10, count};
         DiamondOutput output;

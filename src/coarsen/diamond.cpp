@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/check.h"
-#include "geometry/lattice.h"
 
 namespace pietra {
 
@@ -14,15 +13,7 @@ constexpr uint32_t kNoVertex = ~0u;
 // roots.
 constexpr int kTopLevels = 6;
 constexpr uint32_t kSmallTopPatch = 250;
-constexpr uint32_t kSmallestPatch = 128;  // below this there is nothing to gain
-
-void copyVertex(const Mesh& from, uint32_t v, int scalar_count, Mesh& to) {
-    to.position.push_back(from.position[v]);
-    to.normal.push_back(from.normal[v]);
-    if (!from.colour.empty()) to.colour.push_back(from.colour[v]);
-    for (int s = 0; s < scalar_count; ++s)
-        to.scalar.push_back(from.scalar[size_t(v) * size_t(scalar_count) + size_t(s)]);
-}
+constexpr uint32_t kCrumbTriangles = 32;  // fewer join another cell of the diamond
 
 }  // namespace
 
@@ -40,12 +31,7 @@ void DiamondWorker::addCell(const CellMesh& child, uint8_t label) {
     const Mesh& mesh = child.mesh;
     Mesh& merged = merged_.mesh;
     local_.resize(mesh.vertexCount());
-    for (uint32_t v = 0; v < mesh.vertexCount(); ++v) {
-        const auto [id, is_new] =
-            ids_.insert(latticeKey(mesh.position[v]), uint32_t(merged.vertexCount()));
-        if (is_new) copyVertex(mesh, v, scalar_count_, merged);
-        local_[v] = id;
-    }
+    for (uint32_t v = 0; v < mesh.vertexCount(); ++v) local_[v] = joiner_.addVertex(mesh, v);
     for (const Triangle& t : mesh.triangle)
         merged.triangle.push_back({local_[t[0]], local_[t[1]], local_[t[2]]});
     const auto append = [](auto& to, const auto& from) {
@@ -67,7 +53,7 @@ void DiamondWorker::merge(const DiamondInput& input) {
     size_t triangles = 0;
     for (const std::vector<CellBlob>& blobs : input.children)
         for (const CellBlob& blob : blobs) triangles += blob.triangles;
-    ids_.reserve(triangles * 3 / 4);
+    joiner_.begin(merged_.mesh, triangles * 3 / 4);
     for (size_t c = 0; c < input.children.size(); ++c)
         for (const CellBlob& blob : input.children[c]) {
             blob.store->get(blob, child_);
@@ -90,9 +76,11 @@ void DiamondWorker::run(const DiamondInput& input, DiamondOutput& output) {
     simplify.cell = label_;
     simplify.quota = input.quota;
     simplify.shift = shift_;
-    simplify.scalar_count = scalar_count_;
+    simplify.scalar_count = int(scalar_range_.size());
+    simplify.scalar_range = scalar_range_;
     simplify.free_error = input.child_error;
     simplifier_.run(simplify, simplified_);
+    moveCrumbs(input.children.size());
 
     DeviationInput deviation;
     deviation.before = &merged_.mesh;
@@ -110,6 +98,33 @@ void DiamondWorker::run(const DiamondInput& input, DiamondOutput& output) {
     output.clustered = simplified_.clustered;
 }
 
+// A cell of a few triangles joins a larger one, for the diamonds above it as in crumbs.h.
+void DiamondWorker::moveCrumbs(size_t cells) {
+    std::vector<uint8_t>& cell = simplified_.cell;
+    std::vector<uint32_t> count(cells, 0);
+    for (const uint8_t c : cell) ++count[c];
+    const auto isCrumb = [&](uint32_t c) { return count[c] < kCrumbTriangles; };
+    const auto crumbs = std::count_if(cell.begin(), cell.end(), isCrumb);
+    if (crumbs == 0 || size_t(crumbs) == cell.size()) return;
+    spread_.clear();
+    for (size_t t = 0; t < cell.size(); ++t)
+        if (isCrumb(cell[t])) spread_.add(simplified_.mesh.triangle[t]);
+    for (size_t t = 0; t < cell.size(); ++t) {
+        const Triangle& v = simplified_.mesh.triangle[t];
+        if (isCrumb(cell[t])) continue;
+        for (size_t k = 0; k < 3; ++k) spread_.claim(v[k], v[(k + 1) % 3], cell[t]);
+    }
+    spread_.run();
+    size_t next = 0;
+    for (uint8_t& c : cell) {
+        if (!isCrumb(c)) continue;
+        const uint32_t owner = spread_.owner(next++);
+        if (owner == EdgeSpread::kNobody) continue;
+        closed_[owner] &= closed_[c];
+        c = uint8_t(owner);
+    }
+}
+
 void DiamondWorker::takeApart(size_t cells, DiamondOutput& output) {
     const Mesh& mesh = simplified_.mesh;
     output.cells.resize(cells);
@@ -118,7 +133,7 @@ void DiamondWorker::takeApart(size_t cells, DiamondOutput& output) {
         cell.mesh.clear();
         cell.bounds.to_original.clear();
         cell.bounds.from_original.clear();
-        // Triangles keep their cell, and collapses keep components apart. Clustering does not.
+        // Collapses keep components apart. Clustering does not.
         cell.closed = closed_[c] && simplified_.clustered == 0;
         local_.assign(mesh.vertexCount(), kNoVertex);
         for (size_t t = 0; t < mesh.triangleCount(); ++t) {
@@ -128,7 +143,7 @@ void DiamondWorker::takeApart(size_t cells, DiamondOutput& output) {
                 uint32_t& v = local_[mesh.triangle[t][k]];
                 if (v == kNoVertex) {
                     v = uint32_t(cell.mesh.vertexCount());
-                    copyVertex(mesh, mesh.triangle[t][k], scalar_count_, cell.mesh);
+                    copyVertex(mesh, mesh.triangle[t][k], cell.mesh);
                 }
                 triangle[k] = v;
             }

@@ -9,11 +9,15 @@
 
 #include "coarsen/cell_path.h"
 #include "coarsen/cell_store.h"
-#include "coarsen/key_map.h"
+#include "coarsen/edge_spread.h"
+#include "coarsen/mesh_joiner.h"
 #include "simplify/deviation.h"
 #include "simplify/simplify.h"
 
 namespace pietra {
+
+/// Below this there is nothing to gain: cells of fewer triangles have no quota.
+inline constexpr uint32_t kSmallestPatch = 128;
 
 struct DiamondInput {
     /// For each split cell of the diamond, in path order: where its children's meshes lie (one or
@@ -31,19 +35,24 @@ struct DiamondOutput {
 
 class DiamondWorker {
 public:
-    DiamondWorker(int shift, int scalar_count) : shift_(shift), scalar_count_(scalar_count) {}
+    /// `scalar_range`: as in SimplifyInput, one a scalar.
+    DiamondWorker(int shift, std::vector<float> scalar_range)
+        : shift_(shift), scalar_range_(std::move(scalar_range)) {}
     /// Overwrites `output`, keeping its capacity.
     void run(const DiamondInput& input, DiamondOutput& output);
 
 private:
     void merge(const DiamondInput& input);
     void addCell(const CellMesh& child, uint8_t label);
+    void moveCrumbs(size_t cells);
     void takeApart(size_t cells, DiamondOutput& output);
 
-    int shift_, scalar_count_;
+    int shift_;
+    std::vector<float> scalar_range_;
     Simplifier simplifier_;
     Deviation deviation_;
-    KeyMap ids_;
+    MeshJoiner joiner_;
+    EdgeSpread spread_;
     CellMesh child_, merged_;
     std::vector<uint8_t> label_;   // per merged triangle: its cell
     std::vector<uint8_t> closed_;  // per cell: what is merged into it is closed

@@ -6,7 +6,7 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
-#include "coarsen/key_map.h"
+#include "coarsen/mesh_joiner.h"
 
 namespace pietra {
 
@@ -105,20 +105,15 @@ private:
 /// ones.
 class LeafCutter {
 public:
-    LeafCutter(const VertexRecord& record, const ComponentTable& components, float bound)
-        : record_(record), components_(components), bound_(bound) {}
+    LeafCutter(const ComponentTable& components, float bound)
+        : components_(components), bound_(bound) {}
 
     /// Appends the triangles of `bucket` that lie in the cell.
     void add(const BucketMesh& bucket, CellId cell) {
         const Mesh& mesh = bucket.mesh;
         const size_t begin = findPath(mesh, firstPath(cell)),
                      end = findPath(mesh, lastPath(cell) + 1);
-        for (size_t t = begin; t < end; ++t) {
-            Triangle triangle;
-            for (size_t k = 0; k < 3; ++k) triangle[k] = addVertex(mesh, mesh.triangle[t][k]);
-            out_.mesh.triangle.push_back(triangle);
-            out_.mesh.edge_class.push_back(mesh.edge_class[t]);
-        }
+        for (size_t t = begin; t < end; ++t) joiner_.addTriangle(mesh, t);
         if (begin < end) out_.closed = out_.closed && allClosed(bucket.components.runs, begin, end);
     }
 
@@ -132,7 +127,7 @@ public:
     void start() {
         out_.mesh.clear();
         out_.closed = true;
-        ids_.reserve(0);
+        joiner_.begin(out_.mesh, 0);
     }
 
 private:
@@ -157,23 +152,9 @@ private:
         return low;
     }
 
-    uint32_t addVertex(const Mesh& mesh, uint32_t v) {
-        const auto [id, is_new] =
-            ids_.insert(latticeKey(mesh.position[v]), uint32_t(out_.mesh.position.size()));
-        if (is_new) {
-            out_.mesh.position.push_back(mesh.position[v]);
-            out_.mesh.normal.push_back(mesh.normal[v]);
-            if (record_.colours) out_.mesh.colour.push_back(mesh.colour[v]);
-            for (size_t s = 0; s < record_.scalar_count; ++s)
-                out_.mesh.scalar.push_back(mesh.scalar[v * record_.scalar_count + s]);
-        }
-        return id;
-    }
-
-    const VertexRecord& record_;
     const ComponentTable& components_;
     float bound_;
-    KeyMap ids_;
+    MeshJoiner joiner_;
     CellMesh out_;
 };
 
@@ -222,7 +203,7 @@ Leaves buildLeaves(Partition& partition, const VertexRecord& record, const LeafS
         else
             runs.back().second = i + 1;
     parallelFor(runs.size(), [&](size_t r) {
-        LeafCutter cutter(record, components, settings.bound);
+        LeafCutter cutter(components, settings.bound);
         size_t loaded = bucketAt(firstPath(order[runs[r].first]));
         BucketMesh bucket = repository.get(loaded);
         for (size_t i = runs[r].first; i < runs[r].second; ++i) {

@@ -56,13 +56,22 @@ VertexTable::VertexTable(TriangleSource& source, const std::string& input_name,
 Box3d VertexTable::readBounds(TriangleSource& source, Progress& progress) {
     progress.beginStage("read vertices", source.vertexCount());
     Box3d box;
+    std::vector<float> low(record_.scalar_count, HUGE_VALF), high(record_.scalar_count, -HUGE_VALF);
     VertexBatch batch;
     source.rewindVertices();
     while (source.readVertices(batch)) {
         for (const Vec3d& p : batch.position) box.add(p);
+        for (size_t i = 0; i < batch.scalar.size(); ++i) {
+            if (!std::isfinite(batch.scalar[i])) continue;
+            const size_t s = i % record_.scalar_count;
+            low[s] = std::min(low[s], batch.scalar[i]);
+            high[s] = std::max(high[s], batch.scalar[i]);
+        }
         count_ += batch.position.size();
         progress.tick(batch.position.size());
     }
+    for (size_t s = 0; s < low.size(); ++s)
+        scalar_range_.push_back(low[s] <= high[s] ? high[s] - low[s] : 0);
     return box;
 }
 

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "base/progress.h"
 #include "extmem/spill.h"
@@ -53,6 +54,8 @@ public:
     /// Bounds of all vertices, used or not, in lattice units.
     const Box3i& bounds() const { return bounds_; }
     uint64_t size() const { return count_; }
+    /// The width of each scalar's range over all vertices, used or not; 0 where none is finite.
+    const std::vector<float>& scalarRanges() const { return scalar_range_; }
     /// Upper bound of how far a vertex moved onto the lattice, in lattice units.
     float quantisationError() const;
     /// Frees the records.
@@ -71,6 +74,7 @@ private:
     Lattice lattice_;
     Box3i bounds_;
     uint64_t count_ = 0;
+    std::vector<float> scalar_range_;
     Spill records_;
 };
 

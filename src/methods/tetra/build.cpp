@@ -6,6 +6,8 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "coarsen/crumbs.h"
+#include "coarsen/diamond.h"
 #include "coarsen/leaves.h"
 #include "coarsen/partition.h"
 #include "coarsen/precision.h"
@@ -75,9 +77,11 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
     leaf_settings.bound = vertices.quantisationError();
     leaf_settings.component_bytes = plan.work / 16;
     Leaves leaves = buildLeaves(partition, record, leaf_settings, space, leaf_store, progress);
+    moveCrumbs(leaves, leaf_store, std::min(kSmallestPatch, settings.leaf_triangles / 8), progress);
 
-    LevelSettings level_settings{settings.patch_triangles, vertices.lattice().shift,
-                                 source.schema(), vertices.quantisationError(), settings.jobs};
+    LevelSettings level_settings{
+        settings.patch_triangles, vertices.lattice().shift,     source.schema(),
+        vertices.scalarRanges(),  vertices.quantisationError(), settings.jobs};
     const LevelCounts counts = buildLevels(leaves, level_settings, space, writer, progress);
 
     BuildReport report;

@@ -15,8 +15,8 @@ namespace pietra::tetra {
 
 namespace {
 
-/// A page holds whole diamonds and leaves, at least this many triangles of them; fewer in the coarse
-/// levels, so that all threads have work there, and a first picture needs little.
+/// A page holds whole diamonds and leaves, at least this many triangles of them; fewer in the
+/// coarse levels, so that all threads have work there, and a first picture needs little.
 constexpr uint64_t kPageTriangles = 8192, kSmallestPageTriangles = 1024, kUnitsOfLevel = 16;
 
 /// What a finished cell leaves to its parent.
@@ -49,7 +49,8 @@ struct UnitResult {
 
 /// Scratch of one thread.
 struct Worker {
-    Worker(int shift, int scalar_count) : diamond(shift, scalar_count) {}
+    explicit Worker(const LevelSettings& settings)
+        : diamond(settings.shift, settings.scalar_range) {}
     DiamondWorker diamond;
     DiamondInput input;
     std::vector<DiamondOutput> outputs;
@@ -66,8 +67,7 @@ public:
           space_(space),
           writer_(writer),
           progress_(progress),
-          workers_(
-              [this] { return Worker(settings_.shift, int(settings_.schema.scalars.size())); }) {
+          workers_([this] { return Worker(settings_); }) {
         page_settings_.shift = settings.shift;
         page_settings_.colours = settings.schema.colours;
         page_settings_.scalar_count = int(settings.schema.scalars.size());

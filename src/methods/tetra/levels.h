@@ -13,7 +13,8 @@ struct LevelSettings {
     uint32_t patch_triangles;
     int shift;
     AttributeSchema schema;
-    float quantisation_error;  ///< what the leaves state, lattice units
+    std::vector<float> scalar_range;  ///< over the whole input, one a scalar
+    float quantisation_error;         ///< what the leaves state, lattice units
     int jobs;
 };
 
@@ -24,6 +25,6 @@ struct LevelCounts {
 
 /// Consumes the leaves.
 LevelCounts buildLevels(Leaves& leaves, const LevelSettings& settings, TempSpace& space,
-                     ModelWriter& writer, Progress& progress);
+                        ModelWriter& writer, Progress& progress);
 
 }  // namespace pietra::tetra
