@@ -1,11 +1,13 @@
 // Reads one mesh file with one reader and says what it took:
 //   bench_readers READER FILE            e.g. bench_readers pietra a.obj
 //   bench_readers --list                 the readers of this build, with the endings they take
+//   bench_readers --ascii IN OUT         writes the mesh IN as ascii PLY or STL, by OUT's ending
 // Prints "TRIANGLES CHECKSUM SECONDS CPU_SECONDS PEAK_RSS_BYTES". One reading a process, so that
 // the peak is its own; readers.py runs readers in turn. A reader is one function and one line in
 // the table.
 
 #include <fmt/format.h>
+#include <fmt/os.h>
 #include <sys/resource.h>
 
 #include <chrono>
@@ -97,6 +99,58 @@ Outcome readAssimp(const std::string& path) {
 }
 #endif
 
+/// Calls take(batch) for all vertices of a source, or all triangles.
+template <class Take>
+void eachVertices(TriangleSource& source, Take&& take) {
+    source.rewindVertices();
+    for (VertexBatch batch; source.readVertices(batch);) take(batch);
+}
+template <class Take>
+void eachTriangles(TriangleSource& source, Take&& take) {
+    source.rewindTriangles();
+    for (TriangleBatch batch; source.readTriangles(batch);) take(batch);
+}
+
+void writeAsciiPly(TriangleSource& source, fmt::ostream& out) {
+    uint64_t triangles = 0;
+    eachTriangles(source, [&](const TriangleBatch& batch) { triangles += batch.triangle.size(); });
+    out.print(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n"
+        "property float z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        source.vertexCount(), triangles);
+    eachVertices(source, [&](const VertexBatch& batch) {
+        for (const Vec3f p : batch.position) out.print("{} {} {}\n", p.x, p.y, p.z);
+    });
+    eachTriangles(source, [&](const TriangleBatch& batch) {
+        for (const auto& t : batch.triangle) out.print("3 {} {} {}\n", t[0], t[1], t[2]);
+    });
+}
+
+void writeAsciiStl(TriangleSource& source, fmt::ostream& out) {
+    std::vector<Vec3f> position;
+    eachVertices(source, [&](const VertexBatch& batch) {
+        position.insert(position.end(), batch.position.begin(), batch.position.end());
+    });
+    out.print("solid mesh\n");
+    eachTriangles(source, [&](const TriangleBatch& batch) {
+        for (const auto& t : batch.triangle) {
+            const Vec3f a = position[t[0]], b = position[t[1]], c = position[t[2]];
+            const Vec3f n = glm::normalize(glm::cross(b - a, c - a));
+            out.print("  facet normal {} {} {}\n    outer loop\n", n.x, n.y, n.z);
+            for (const Vec3f& p : {a, b, c}) out.print("      vertex {} {} {}\n", p.x, p.y, p.z);
+            out.print("    endloop\n  endfacet\n");
+        }
+    });
+    out.print("endsolid mesh\n");
+}
+
+int writeAscii(const std::string& in, const std::string& path) {
+    const auto source = openSource({in});
+    auto out = fmt::output_file(path);
+    (path.ends_with(".stl") ? writeAsciiStl : writeAsciiPly)(*source, out);
+    return 0;
+}
+
 struct Reader {
     const char* name;
     const char* endings;
@@ -104,13 +158,13 @@ struct Reader {
 };
 
 constexpr Reader kReaders[] = {
-    {"pietra", ".obj .ply", readOnce},
-    {"pietra-build", ".obj .ply", readAsBuild},
+    {"pietra", ".obj .ply .stl .glb", readOnce},
+    {"pietra-build", ".obj .ply .stl .glb", readAsBuild},
 #ifdef PIETRA_BENCH_TINYOBJ
     {"tinyobjloader", ".obj", readTinyObj},
 #endif
 #ifdef PIETRA_BENCH_ASSIMP
-    {"assimp", ".obj .ply", readAssimp},
+    {"assimp", ".obj .ply .stl .glb", readAssimp},
 #endif
 };
 
@@ -145,12 +199,13 @@ int main(int argc, char** argv) {
         return 0;
     }
     try {
+        if (argc == 4 && std::strcmp(argv[1], "--ascii") == 0) return writeAscii(argv[2], argv[3]);
         for (const Reader& reader : kReaders)
             if (argc == 3 && std::strcmp(argv[1], reader.name) == 0) return run(reader, argv[2]);
     } catch (const Error& e) {
         fmt::print(stderr, "{}\n", e.what());
         return e.exitCode();
     }
-    fmt::print(stderr, "usage: bench_readers READER FILE | --list\n");
+    fmt::print(stderr, "usage: bench_readers READER FILE | --list | --ascii IN OUT\n");
     return 2;
 }

@@ -162,11 +162,7 @@ private:
 };
 
 bool GltfSource::readVertices(VertexBatch& batch) {
-    batch.first = vertices_read_;
-    batch.position.clear();
-    batch.normal.clear();
-    batch.colour.clear();
-    batch.scalar.clear();
+    batch.restart(vertices_read_);
     while (vertex_instance_ < scene_.instances.size() && batch.position.size() < batch_rows_) {
         const auto& shape = scene_.shapes[scene_.instances[vertex_instance_].mesh];
         const GltfVertexSet& set = shape.sets[vertex_set_];

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <string_view>
 
 #include "base/error.h"
@@ -35,55 +34,31 @@ constexpr LongWord kLongWords[] = {
     {"res", ObjWord::kFreeForm},
 };
 
-/// A one in every byte.
-constexpr uint64_t kOnes = 0x0101010101010101;
-
-uint64_t loadBytes(const char* p) {
-    uint64_t bytes;
-    std::memcpy(&bytes, p, sizeof bytes);
-    return bytes;
-}
-
 /// How many words lie in [p, end): eight bytes at a time, of which up to seven beyond the end are
 /// read.
 size_t wordsBetween(const char* p, const char* end) {
-    static_assert(std::endian::native == std::endian::little);
     uint64_t blank_before = 0x80;  // the top bit of the lowest byte: that of the byte before
     uint64_t count = 0;
     for (; p < end; p += 8) {
-        const uint64_t bytes = loadBytes(p);
-        // The top bit of each byte: whether it is above the blank.
-        uint64_t solid = (((bytes & kOnes * 0x7f) + kOnes * (0x7f - ' ')) | bytes) & kOnes * 0x80;
+        uint64_t solid = solidBytes(loadEight(p));
         if (end - p < 8) solid &= ~uint64_t(0) >> (64 - 8 * (end - p));
         const uint64_t starts = solid & (~solid << 8 | blank_before);
-        count += (starts >> 7) * kOnes >> 56;
+        count += (starts >> 7) * eightTimes(1) >> 56;
         blank_before = ~solid >> 56 & 0x80;
     }
     return count;
 }
 
-/// A whole number at `p`, or null.
-const char* takeIndex(const char* p, int64_t& index) {
-    const bool negative = *p == '-';
-    if (negative || *p == '+') ++p;
-    const char* const first = p;
-    uint64_t value = 0;
-    for (; isDigit(*p); ++p) value = value * 10 + uint64_t(*p - '0');
-    if (p == first || p - first > 18) return nullptr;  // more may have wrapped
-    index = negative ? -int64_t(value) : int64_t(value);
-    return p;
-}
-
-/// As takeIndex(), where the number is often that whose text is [known, known + size), known_index:
+/// As parseInteger(), where the number is often that whose text is [known, known + size), known_index:
 /// most files give a corner the same index of everything.
 const char* takeLikelyIndex(const char* p, const char* known, size_t size, int64_t known_index,
                             int64_t& index) {
-    const uint64_t differs = loadBytes(p) ^ loadBytes(known);
+    const uint64_t differs = loadEight(p) ^ loadEight(known);
     if (size < 8 && differs << (64 - 8 * size) == 0 && !isDigit(p[size])) {
         index = known_index;
         return p + size;
     }
-    return takeIndex(p, index);
+    return parseInteger(p, index);
 }
 
 }  // namespace
@@ -91,28 +66,11 @@ const char* takeLikelyIndex(const char* p, const char* known, size_t size, int64
 ObjPlace ObjCursor::start() {
     reader_.seek(0);
     const size_t size = reader_.peek(ByteReader::kWindow);
-    const char* const text = window();
-    const bool has_lf = std::memchr(text, '\n', size), has_cr = std::memchr(text, '\r', size);
-    line_end_ = has_cr && !has_lf ? '\r' : '\n';
+    const std::string_view text(reinterpret_cast<const char*>(reader_.data()), size);
+    line_end_ = text.find('\r') != text.npos && text.find('\n') == text.npos ? '\r' : '\n';
     constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-    seek({std::string_view(text, size).starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0, 1});
+    seek({text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0, 1});
     return place();
-}
-
-void ObjCursor::seek(const ObjPlace& place) {
-    reader_.seek(place.offset);
-    line_ = place.line;
-    p_ = window();
-    refill();
-}
-
-void ObjCursor::refill(size_t want) {
-    reader_.advance(size_t(p_ - window()));
-    const size_t available = reader_.peek(want);
-    p_ = window();
-    end_ = p_ + available;
-    at_end_ = available < kMaxWord;
-    limit_ = at_end_ ? end_ : end_ - kMaxWord;
 }
 
 void ObjCursor::skipComment() {
@@ -165,7 +123,7 @@ size_t ObjCursor::countWords() {
 ObjCorner ObjCursor::takeCorner() {
     ObjCorner corner;
     const char* const first = p_;
-    const char* p = takeIndex(p_, corner.vertex);
+    const char* p = parseInteger(p_, corner.vertex);
     if (p && *p == '/') {
         const auto size = size_t(p - first);
         const auto takeNext = [&](int64_t& index) {
@@ -182,15 +140,6 @@ ObjCorner ObjCursor::takeCorner() {
         fail("a face has a vertex of index 0, but indices count from 1");
     p_ = p;
     return corner;
-}
-
-std::string ObjCursor::wordHere() const {
-    std::string word;
-    const auto size = size_t(std::min<ptrdiff_t>(end_ - p_, 41));
-    for (size_t i = 0; i < size && !endsWord(p_ + i); ++i)
-        word += p_[i] > ' ' && p_[i] < 127 ? p_[i] : '?';
-    if (word.size() > 40) word = word.substr(0, 40) + "...";
-    return word;
 }
 
 void ObjCursor::fail(const std::string& what) const {

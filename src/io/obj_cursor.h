@@ -13,8 +13,8 @@
 #include <cstring>
 #include <string>
 
-#include "io/byte_reader.h"
 #include "io/number_parser.h"
+#include "io/text_window.h"
 
 namespace pietra {
 
@@ -46,18 +46,19 @@ struct ObjCorner {
     int64_t normal = 0;
 };
 
-class ObjCursor {
+class ObjCursor : private TextWindow {
 public:
-    static constexpr size_t kMaxWord = 1024;
-
-    explicit ObjCursor(ByteReader& reader) : reader_(reader) {}
+    explicit ObjCursor(ByteReader& reader) : TextWindow(reader) {}
 
     /// The first statement; also finds out how lines end.
     ObjPlace start();
 
-    uint64_t offset() const { return reader_.offset() + uint64_t(p_ - window()); }
+    using TextWindow::offset;
     ObjPlace place() const { return {offset(), line_}; }
-    void seek(const ObjPlace& place);
+    void seek(const ObjPlace& place) {
+        TextWindow::seek(place.offset);
+        line_ = place.line;
+    }
 
     /// Moves to the next statement and over its first word, but for one that is kUnknown. False at
     /// the end of the file.
@@ -65,7 +66,7 @@ public:
     /// Moves past the statement.
     void skipStatement();
     /// The word at the cursor, for messages.
-    std::string wordHere() const;
+    std::string wordHere() const { return shownWord(p_); }
     /// How many words follow in the statement; stays where it is. Fast, so what joins lines and
     /// comments within are counted too, and of a statement of over 1 MiB only the beginning is.
     size_t countWords();
@@ -73,8 +74,7 @@ public:
     /// Moves to the next word of the statement; false where there is none.
     bool more() {
         for (;; ++p_) {
-            if (p_ > limit_) [[unlikely]]
-                refill();
+            need();
             const char c = *p_;
             if (static_cast<unsigned char>(c) > ' ') {
                 if (c == '#') return false;
@@ -111,8 +111,6 @@ public:
     [[noreturn]] void failWord(const std::string& what) const;
 
 private:
-    const char* window() const { return reinterpret_cast<const char*>(reader_.data()); }
-    void refill(size_t want = kMaxWord);
     void skipComment();
     /// At `p` is a backslash at the end of a line.
     bool joinsLines(const char* p) const {
@@ -126,12 +124,7 @@ private:
     ObjWord takeWord();
     ObjWord takeLongWord();
 
-    ByteReader& reader_;
     char line_end_ = '\n';
-    const char* p_ = nullptr;
-    const char* end_ = nullptr;    ///< of what lies in the window
-    const char* limit_ = nullptr;  ///< up to here kMaxWord bytes follow, or the file's last
-    bool at_end_ = false;          ///< end_ is the end of the file
     uint64_t line_ = 1;
 };
 
@@ -159,8 +152,7 @@ inline void ObjCursor::skipStatement() {
 
 inline bool ObjCursor::nextStatement(ObjWord& word) {
     for (;;) {
-        if (p_ > limit_) [[unlikely]]
-            refill();
+        need();
         const char c = *p_;
         if (static_cast<unsigned char>(c) > ' ') {
             if (c == '#') {

@@ -7,23 +7,13 @@
 #include <limits>
 
 #include "base/error.h"
-#include "io/number_parser.h"
 
 namespace pietra {
 
 namespace {
 
-/// Longest run of characters that may be one number.
-constexpr size_t kMaxToken = 1024;
 /// Longest padding after the last element.
 constexpr size_t kMaxPadding = 4096;
-
-bool isBlank(char c) {
-    return c == ' ' || c == '\t' || c == '\v' || c == '\f';
-}
-bool endsToken(char c) {
-    return isBlank(c) || c == '\n' || c == '\r';
-}
 
 /// Smallest and largest value of an integer type, as doubles (those of 64 bits rounded outward).
 std::pair<double, double> rangeOf(PlyType type) {
@@ -55,78 +45,44 @@ void PlyCursor::fail(const PlyPlace& place, const std::string& what) const {
 }
 
 void PlyCursor::failEnd() {
-    if (!reader_.source().isCompressed()) reader_.seek(reader_.source().lengthBound());
-    while (reader_.peek(1) > 0) reader_.advance(reader_.peek(1));
+    if (!isAscii()) {
+        if (!reader_.source().isCompressed()) reader_.seek(reader_.source().lengthBound());
+        while (reader_.peek(1) > 0) reader_.advance(reader_.peek(1));
+    }
     fail(fmt::format("the file ends within element {}, after {} of {} rows", element_->name, row_,
                      element_->count));
 }
 
-void PlyCursor::beginRow() {
-    if (!isAscii()) return;
-    while (!skipBlanks())
-        if (!skipLineEnd()) failEnd();
+void PlyCursor::skipLineEnd() {
+    if (p_ == end_) failEnd();
+    p_ += p_[0] == '\r' && p_[1] == '\n' ? 2 : 1;
+    ++line_;
 }
 
-void PlyCursor::endRow() {
-    ++row_;
-    if (!isAscii()) return;
+void PlyCursor::endLine() {
     if (skipBlanks())
         fail(fmt::format("more values than element {} has properties", element_->name));
-    skipLineEnd();
+    if (p_ != end_) skipLineEnd();
 }
 
-bool PlyCursor::skipBlanks() {
-    while (reader_.peek(kMaxToken) > 0) {
-        if (const char c = char(*reader_.data()); !isBlank(c)) return c != '\n' && c != '\r';
-        reader_.advance(1);
-    }
-    return false;
-}
-
-bool PlyCursor::skipLineEnd() {
-    const size_t available = reader_.peek(2);
-    if (available == 0) return false;
-    const bool pair = available > 1 && reader_.data()[0] == '\r' && reader_.data()[1] == '\n';
-    reader_.advance(pair ? 2 : 1);
-    ++line_;
-    return true;
-}
-
-/// The start of the next token, which lies in one piece and ends before a character of another
-/// kind.
-const char* PlyCursor::token(const PlyProperty& property) {
-    while (!skipBlanks()) [[unlikely]] {
-            if (reader_.atEnd()) failEnd();
-            if (!lists_span_lines_)
-                fail(fmt::format("the line ends where property {} of element {} is expected",
-                                 property.name, element_->name));
-            skipLineEnd();
-        }
-    return reinterpret_cast<const char*>(reader_.data());
-}
-
-void PlyCursor::takeToken(const char* end, const PlyProperty& property) {
-    const char* start = reinterpret_cast<const char*>(reader_.data());
-    const auto length = size_t(end - start);
-    if (length < reader_.peek(1) && !endsToken(*end)) failNumber(property);
-    reader_.advance(length);
+void PlyCursor::findToken(const PlyProperty& property) {
+    do {
+        if (p_ == end_) failEnd();
+        if (!lists_span_lines_)
+            fail(fmt::format("the line ends where property {} of element {} is expected",
+                             property.name, element_->name));
+        skipLineEnd();
+    } while (!skipBlanks());
 }
 
 void PlyCursor::skipToken(const PlyProperty& property) {
-    const char* start = token(property);
-    const char* end = std::find_if(start, start + reader_.peek(1), endsToken);
-    reader_.advance(size_t(end - start));
+    if (!skipBlanks()) findToken(property);
+    for (; !isBlankOrLineEnd(*p_) && (p_ != end_ || !at_end_); ++p_) need();
 }
 
-void PlyCursor::failNumber(const PlyProperty& property) {
-    const char* start = reinterpret_cast<const char*>(reader_.data());
-    const size_t size = std::min<size_t>(reader_.peek(1), 41);
-    std::string word;
-    for (size_t i = 0; i < size && !endsToken(start[i]); ++i)
-        word += start[i] >= 32 && start[i] < 127 ? start[i] : '?';
-    if (word.size() > 40) word = word.substr(0, 40) + "...";
-    fail(fmt::format("\"{}\" is no number (property {} of element {})", word, property.name,
-                     element_->name));
+void PlyCursor::failNumber(const PlyProperty& property) const {
+    fail(fmt::format("\"{}\" is no number (property {} of element {})", shownWord(p_),
+                     property.name, element_->name));
 }
 
 double PlyCursor::takeReal(PlyType type) {
@@ -158,38 +114,21 @@ int64_t PlyCursor::takeInteger(PlyType type) {
     }
 }
 
-double PlyCursor::nextReal(const PlyProperty& property) {
-    if (!isAscii()) return takeReal(property.type);
-    const char* start = token(property);
-    double value = 0;
-    const char* end = parseReal(start, start + reader_.peek(1), value);
-    if (!end) failNumber(property);
-    if (property.type == PlyType::kFloat) {
-        value = double(float(value));
-    } else if (property.type != PlyType::kDouble) {
-        const auto [least, most] = rangeOf(property.type);
-        if (!(value >= least && value <= most))
-            fail(fmt::format("{} does not fit the type {} of property {} of element {}", value,
-                             nameOf(property.type), property.name, element_->name));
-        value = std::trunc(value);
-    }
-    takeToken(end, property);
-    return value;
+double PlyCursor::wholeReal(double value, const PlyProperty& property) const {
+    const auto [least, most] = rangeOf(property.type);
+    if (!(value >= least && value <= most))
+        fail(fmt::format("{} does not fit the type {} of property {} of element {}", value,
+                         nameOf(property.type), property.name, element_->name));
+    return std::trunc(value);
 }
 
-int64_t PlyCursor::nextInteger(const PlyProperty& property, PlyType type) {
-    if (!isAscii()) return takeInteger(type);
-    const char* start = token(property);
-    int64_t value = 0;
-    const char* end = parseInteger(start, value);
-    if (!end || *end == '.' || *end == 'e' || *end == 'E') [[unlikely]] {
-        double real = 0;
-        end = parseReal(start, start + reader_.peek(1), real);
-        if (!end || !(std::abs(real) < 0x1p63) || real != std::trunc(real)) failNumber(property);
-        value = int64_t(real);
-    }
-    takeToken(end, property);
-    return value;
+/// Some programs write whole numbers as "3.0" or "1e3".
+const char* PlyCursor::integerAsReal(int64_t& value) const {
+    double real = 0;
+    const char* const after = parseReal(p_, end_, real);
+    if (!after || !(std::abs(real) < 0x1p63) || real != std::trunc(real)) return nullptr;
+    value = int64_t(real);
+    return after;
 }
 
 uint64_t PlyCursor::nextCount(const PlyProperty& property) {
@@ -235,15 +174,9 @@ void PlyCursor::skipProperty(const PlyProperty& property) {
     skipValues(property, property.type, count);
 }
 
-void PlyCursor::skipAsciiRow() {
+void PlyCursor::skipTextRow() {
     beginRow();
-    while (const size_t available = reader_.peek(1)) {
-        const auto* text = reinterpret_cast<const char*>(reader_.data());
-        const char* end =
-            std::find_if(text, text + available, [](char c) { return c == '\n' || c == '\r'; });
-        reader_.advance(size_t(end - text));
-        if (end < text + available) break;
-    }
+    for (; p_ != end_ && *p_ != '\n' && *p_ != '\r'; ++p_) need();
     endRow();
 }
 
@@ -266,7 +199,7 @@ void PlyCursor::skipRows(uint64_t count) {
     }
     for (; count > 0; --count) {
         if (isAscii() && !lists_span_lines_) {
-            skipAsciiRow();
+            skipTextRow();
             continue;
         }
         beginRow();
@@ -277,8 +210,10 @@ void PlyCursor::skipRows(uint64_t count) {
 
 void PlyCursor::expectEnd() {
     if (isAscii()) {
-        while (!skipBlanks())
-            if (!skipLineEnd()) return;
+        while (!skipBlanks()) {
+            if (p_ == end_) return;
+            skipLineEnd();
+        }
         fail("the file goes on after the last element that its header counts");
     }
     const size_t size = reader_.peek(kMaxPadding + 1);

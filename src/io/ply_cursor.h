@@ -11,8 +11,9 @@
 #include <cstring>
 #include <string>
 
-#include "io/byte_reader.h"
+#include "io/number_parser.h"
 #include "io/ply_header.h"
+#include "io/text_window.h"
 
 namespace pietra {
 
@@ -39,16 +40,17 @@ inline T loadValue(const uint8_t* p) {
     }
 }
 
-class PlyCursor {
+class PlyCursor : private TextWindow {
 public:
-    PlyCursor(ByteReader& reader, PlyEncoding encoding) : reader_(reader), encoding_(encoding) {}
+    PlyCursor(ByteReader& reader, PlyEncoding encoding) : TextWindow(reader), encoding_(encoding) {}
 
     ByteReader& reader() { return reader_; }
     bool isAscii() const { return encoding_ == PlyEncoding::kAscii; }
     bool swapsBytes() const { return encoding_ == PlyEncoding::kBigEndian; }
-    PlyPlace place() const { return {reader_.offset(), line_}; }
+    PlyPlace place() const { return {isAscii() ? offset() : reader_.offset(), line_}; }
     void seek(const PlyPlace& place) {
-        reader_.seek(place.offset);
+        if (!isAscii()) return reader_.seek(place.offset);
+        TextWindow::seek(place.offset);
         line_ = place.line;
     }
 
@@ -58,22 +60,32 @@ public:
         row_ = row;
         lists_span_lines_ = element.name == "tristrips";
     }
-    void beginRow();
-    void endRow();
+    void beginRow() {
+        if (isAscii())
+            while (!skipBlanks()) skipLineEnd();
+    }
+    void endRow() {
+        ++row_;
+        if (isAscii() && p_ != end_) endLine();
+    }
     /// `count` rows were read past this cursor.
     void countRows(uint64_t count) { row_ += count; }
     uint64_t row() const { return row_; }
 
     /// The next value as a real number. In ascii it is rounded to the type of the property, and a
     /// whole number that does not fit it is a fault.
-    double nextReal(const PlyProperty& property);
+    double nextReal(const PlyProperty& property) {
+        return isAscii() ? textReal(property) : takeReal(property.type);
+    }
     /// The next value, or count or item of a list, as a whole number of `type`.
-    int64_t nextInteger(const PlyProperty& property, PlyType type);
+    int64_t nextInteger(const PlyProperty& property, PlyType type) {
+        return isAscii() ? textInteger(property) : takeInteger(type);
+    }
     /// The count of a list; not negative.
     uint64_t nextCount(const PlyProperty& property);
     /// The next bytes as they are (binary only).
     void copyBytes(void* out, size_t bytes) {
-        std::memcpy(out, need(bytes), bytes);
+        std::memcpy(out, needBytes(bytes), bytes);
         reader_.advance(bytes);
     }
     /// Passes over the next `count` values of `type`.
@@ -90,14 +102,14 @@ public:
     [[noreturn]] void failEnd();
 
 private:
-    const uint8_t* need(size_t bytes) {
+    const uint8_t* needBytes(size_t bytes) {
         if (reader_.peek(bytes) < bytes) [[unlikely]]
             failEnd();
         return reader_.data();
     }
     template <class T>
     T take() {
-        const uint8_t* p = need(sizeof(T));
+        const uint8_t* p = needBytes(sizeof(T));
         const T value = swapsBytes() ? loadValue<T, true>(p) : loadValue<T, false>(p);
         reader_.advance(sizeof(T));
         return value;
@@ -105,18 +117,53 @@ private:
     double takeReal(PlyType type);
     int64_t takeInteger(PlyType type);
     void skipBytes(uint64_t bytes);
-    void skipAsciiRow();
+    void skipTextRow();
 
+    static bool isBlank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
+    bool endsToken(const char* p) const { return isBlankOrLineEnd(*p) || (p == end_ && at_end_); }
     /// Moves to the next character that is no blank; false at a line end or the end of the file.
-    bool skipBlanks();
-    /// Moves over a line end, if there is one.
-    bool skipLineEnd();
-    const char* token(const PlyProperty& property);
-    void takeToken(const char* end, const PlyProperty& property);
+    bool skipBlanks() {
+        for (;; ++p_) {
+            need();
+            if (static_cast<unsigned char>(*p_) > ' ') return true;
+            if (!isBlank(*p_)) return *p_ != '\n' && *p_ != '\r' && p_ != end_;
+        }
+    }
+    void skipLineEnd();
+    void endLine();
+    double textReal(const PlyProperty& property) {
+        if (!skipBlanks()) [[unlikely]]
+            findToken(property);
+        double value = 0;
+        const char* const after = parseReal(p_, end_, value);
+        takeToken(after, property);
+        return property.type == PlyType::kFloat    ? double(float(value))
+               : property.type == PlyType::kDouble ? value
+                                                   : wholeReal(value, property);
+    }
+    int64_t textInteger(const PlyProperty& property) {
+        if (!skipBlanks()) [[unlikely]]
+            findToken(property);
+        int64_t value = 0;
+        const char* after = parseInteger(p_, value);
+        if (!after || !endsToken(after)) [[unlikely]]
+            after = integerAsReal(value);
+        takeToken(after, property);
+        return value;
+    }
+    /// Moves over the token at hand, which ends at `end`; null where it is no number.
+    void takeToken(const char* end, const PlyProperty& property) {
+        if (!end || !endsToken(end)) [[unlikely]]
+            failNumber(property);
+        p_ = end;
+    }
+    /// At a line end or the end of the file: moves to the next line's token, or throws.
+    void findToken(const PlyProperty& property);
+    const char* integerAsReal(int64_t& value) const;
+    double wholeReal(double value, const PlyProperty& property) const;
     void skipToken(const PlyProperty& property);
-    [[noreturn]] void failNumber(const PlyProperty& property);
+    [[noreturn]] void failNumber(const PlyProperty& property) const;
 
-    ByteReader& reader_;
     PlyEncoding encoding_;
     uint64_t line_ = 0;
     const PlyElement* element_ = nullptr;

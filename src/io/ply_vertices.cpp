@@ -176,11 +176,7 @@ void PlyVertexReader::chooseProperties() {
 }
 
 void PlyVertexReader::read(uint64_t first, VertexBatch& batch) {
-    batch.first = first;
-    batch.position.clear();
-    batch.normal.clear();
-    batch.colour.clear();
-    batch.scalar.clear();
+    batch.restart(first);
     const auto wanted = size_t(std::min<uint64_t>(batch_rows_, element_.count - first));
     while (batch.position.size() < wanted)
         append(rows_.next(wanted - batch.position.size()), batch);

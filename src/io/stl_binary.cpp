@@ -26,7 +26,7 @@ uint32_t loadCount(const uint8_t* header) {
     return count;
 }
 
-class BinaryStl : public StlFacets<float> {
+class BinaryStl : public StlFacets {
 public:
     explicit BinaryStl(ByteReader& reader) : reader_(reader) {
         reader.seek(0);
@@ -45,7 +45,7 @@ public:
     StlPlace start() const override { return {.offset = kHeaderBytes}; }
     std::optional<uint64_t> count() const override { return count_; }
 
-    size_t read(StlPlace& place, std::span<Vec3f> corners) override {
+    size_t read(StlPlace& place, std::span<Vec3d> corners) override {
         const auto wanted = size_t(std::min<uint64_t>(corners.size() / 3, count_ - place.facet));
         reader_.seek(place.offset);
         size_t done = 0;
@@ -82,15 +82,20 @@ private:
             fmt::format("the header counts {} triangles, but the file {}", count_, what));
     }
 
-    void decode(const StlPlace& place, std::span<Vec3f> corners) {
+    void decode(const StlPlace& place, std::span<Vec3d> corners) {
         const uint8_t* in = reader_.data();
         uint32_t attributes = 0;
         bool finite = true;
         for (size_t i = 0; i < corners.size(); i += 3, in += kFacetBytes) {
             uint32_t bits[9];
+            float values[9];
             std::memcpy(bits, in + kNormalBytes, kCornerBytes);
-            for (const uint32_t b : bits) finite &= (b & kExponent) != kExponent;
-            std::memcpy(&corners[i], bits, kCornerBytes);
+            std::memcpy(values, bits, kCornerBytes);
+            double* const out = &corners[i].x;
+            for (int k = 0; k < 9; ++k) {
+                finite &= (bits[k] & kExponent) != kExponent;
+                out[k] = double(values[k]);
+            }
             uint16_t attribute;
             std::memcpy(&attribute, in + kNormalBytes + kCornerBytes, sizeof attribute);
             attributes += attribute != 0;
@@ -106,7 +111,7 @@ private:
         attributes_seen_ += attributes;
     }
 
-    [[noreturn]] void failPoint(const StlPlace& place, std::span<const Vec3f> corners) const {
+    [[noreturn]] void failPoint(const StlPlace& place, std::span<const Vec3d> corners) const {
         size_t corner = 0;
         const auto at = [&] { return corners[corner]; };
         while (std::isfinite(at().x) && std::isfinite(at().y) && std::isfinite(at().z)) ++corner;
@@ -139,7 +144,7 @@ bool sizeFits(ByteReader& reader) {
 
 }  // namespace
 
-std::unique_ptr<StlFacets<float>> openBinaryStl(ByteReader& reader) {
+std::unique_ptr<StlFacets> openBinaryStl(ByteReader& reader) {
     return std::make_unique<BinaryStl>(reader);
 }
 

@@ -25,19 +25,15 @@ struct StlPlace {
     bool in_solid = false;  ///< text only
 };
 
-/// `Real`: float for binary files, double for texts.
-template <class Real>
 class StlFacets {
 public:
-    using Corner = glm::vec<3, Real>;
-
     virtual ~StlFacets() = default;
     virtual StlPlace start() const = 0;
-    /// How many facets there are, where that is known before they are read.
+    /// How many facets there are, where that is known before they are read: in binary files.
     virtual std::optional<uint64_t> count() const = 0;
     /// Reads the facets at `place` and moves it; returns how many: 0 at the end only. `corners`:
     /// three a facet, counter-clockwise seen from outside; all finite.
-    virtual size_t read(StlPlace& place, std::span<Corner> corners) = 0;
+    virtual size_t read(StlPlace& place, std::span<Vec3d> corners) = 0;
     /// As TriangleSource::notes().
     virtual std::vector<std::string> notes() const = 0;
 };
@@ -50,7 +46,7 @@ bool isStlText(ByteReader& reader);
 
 /// Throws InputError where the file is too short, or the count in its header is not what its size
 /// has room for.
-std::unique_ptr<StlFacets<float>> openBinaryStl(ByteReader& reader);
-std::unique_ptr<StlFacets<double>> openTextStl(ByteReader& reader);
+std::unique_ptr<StlFacets> openBinaryStl(ByteReader& reader);
+std::unique_ptr<StlFacets> openTextStl(ByteReader& reader);
 
 }  // namespace pietra

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <type_traits>
 
 #include "base/error.h"
 #include "io/stl_facets.h"
@@ -13,14 +12,16 @@ namespace pietra {
 
 namespace {
 
-template <class Real>
 class StlSource : public TriangleSource {
 public:
-    StlSource(std::unique_ptr<ByteReader> reader, std::unique_ptr<StlFacets<Real>> facets)
+    StlSource(std::unique_ptr<ByteReader> reader, std::unique_ptr<StlFacets> facets)
         : reader_(std::move(reader)),
           facets_(std::move(facets)),
           place_(facets_->start()),
-          facet_count_(facets_->count()) {
+          facet_count_(facets_->count()),
+          // A triangle takes some bytes, so a small file needs no large batch.
+          batch_corners_(
+              3 * size_t(std::min<uint64_t>(kMaxBatch / 3, reader_->source().lengthBound()))) {
         reader_->release();
     }
 
@@ -31,7 +32,7 @@ public:
     }
     uint64_t inputBytes() const override { return reader_->source().storedBytes(); }
     bool cheapToReread() const override {
-        return std::is_same_v<Real, float> && !reader_->source().isCompressed();
+        return facets_->count() && !reader_->source().isCompressed();
     }
     std::vector<std::string> notes() const override { return facets_->notes(); }
 
@@ -44,29 +45,26 @@ public:
     bool readTriangles(TriangleBatch& batch) override;
 
 private:
-    static constexpr size_t kBlockFacets = 2048;
-    static_assert(3 * kBlockFacets <= kMaxBatch);
     /// About as many bytes as writers spend on a facet of a text.
     static constexpr uint64_t kUsualTextBytes = 260;
 
-    size_t readBlock(StlPlace& place);
+    size_t readBlock(StlPlace& place, std::vector<Vec3d>& corners);
     uint64_t facetCount();
 
     std::unique_ptr<ByteReader> reader_;
-    std::unique_ptr<StlFacets<Real>> facets_;
+    std::unique_ptr<StlFacets> facets_;
     AttributeSchema schema_;
     StlPlace place_;  ///< of the vertices read next
     std::optional<uint64_t> facet_count_;
-    std::vector<glm::vec<3, Real>> block_;
+    size_t batch_corners_;
     uint64_t triangles_read_ = 0;
 };
 
-/// Fills block_; returns how many facets it holds, none at the end.
-template <class Real>
-size_t StlSource<Real>::readBlock(StlPlace& place) {
-    // A triangle takes some bytes, so a small file needs no large block.
-    block_.resize(3 * size_t(std::min<uint64_t>(kBlockFacets, reader_->source().lengthBound())));
-    const size_t facets = facets_->read(place, block_);
+/// Returns how many facets `corners` then holds, none at the end.
+size_t StlSource::readBlock(StlPlace& place, std::vector<Vec3d>& corners) {
+    corners.resize(batch_corners_);
+    const size_t facets = facets_->read(place, corners);
+    corners.resize(3 * facets);
     if (facets == 0) {
         if (place.facet == 0)
             throw InputError(reader_->path(), "", "has no triangles: nothing to show");
@@ -75,31 +73,22 @@ size_t StlSource<Real>::readBlock(StlPlace& place) {
     return facets;
 }
 
-template <class Real>
-uint64_t StlSource<Real>::facetCount() {
+uint64_t StlSource::facetCount() {
+    std::vector<Vec3d> dropped;
     if (!facet_count_)
-        for (StlPlace place = facets_->start(); readBlock(place) > 0;) continue;
+        for (StlPlace place = facets_->start(); readBlock(place, dropped) > 0;) continue;
     return *facet_count_;
 }
 
-template <class Real>
-bool StlSource<Real>::readVertices(VertexBatch& batch) {
-    batch.first = 3 * place_.facet;
-    batch.position.clear();
-    batch.normal.clear();
-    batch.colour.clear();
-    batch.scalar.clear();
-    while (batch.position.size() + 3 * kBlockFacets <= kMaxBatch) {
-        const size_t corners = 3 * readBlock(place_), begin = batch.position.size();
-        if (corners == 0) break;
-        batch.position.resize(begin + corners);
-        std::copy_n(block_.begin(), corners, batch.position.begin() + ptrdiff_t(begin));
-    }
-    return !batch.position.empty();
+bool StlSource::readVertices(VertexBatch& batch) {
+    // note: the positions stay, as clearing them first would take as long as decoding.
+    std::vector<Vec3d> position = std::move(batch.position);
+    batch.restart(3 * place_.facet);
+    batch.position = std::move(position);
+    return readBlock(place_, batch.position) > 0;
 }
 
-template <class Real>
-bool StlSource<Real>::readTriangles(TriangleBatch& batch) {
+bool StlSource::readTriangles(TriangleBatch& batch) {
     batch.first = triangles_read_;
     const uint64_t end = std::min(triangles_read_ + kMaxBatch, facetCount());
     batch.triangle.resize(size_t(end - triangles_read_));
@@ -119,12 +108,8 @@ bool isStl(std::span<const uint8_t> head, const std::string& name) {
 }
 
 std::unique_ptr<TriangleSource> openStl(std::unique_ptr<ByteReader> reader) {
-    if (isStlText(*reader)) {
-        auto facets = openTextStl(*reader);
-        return std::make_unique<StlSource<double>>(std::move(reader), std::move(facets));
-    }
-    auto facets = openBinaryStl(*reader);
-    return std::make_unique<StlSource<float>>(std::move(reader), std::move(facets));
+    auto facets = isStlText(*reader) ? openTextStl(*reader) : openBinaryStl(*reader);
+    return std::make_unique<StlSource>(std::move(reader), std::move(facets));
 }
 
 }  // namespace pietra

@@ -198,8 +198,8 @@ TEST(StlSource, namesEveryFaultOfATextByItsLine) {
         {with("vertex 1 0 0\n", ""), "line 6: \"endloop\" stands where \"vertex\" is expected"},
         {with("endloop", "vertex 5 5 5\nendloop"),
          "line 7: \"vertex\" stands where \"endloop\" is expected"},
-        {with("vertex 1 0 0", "vertex 1" + std::string(300, '0') + " 0 0"),
-         "line 5: a word of more than 255 characters"},
+        {with("vertex 1 0 0", "vertex 0 0 " + std::string(2000, 'x')),
+         "line 5: a word of more than 1024 characters"},
     };
     for (const Case& c : cases) {
         const std::string path = dir.write("bad.stl", c.text);

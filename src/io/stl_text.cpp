@@ -10,6 +10,7 @@
 #include "base/error.h"
 #include "io/number_parser.h"
 #include "io/stl_facets.h"
+#include "io/text_window.h"
 
 namespace pietra {
 
@@ -25,53 +26,56 @@ bool isBlank(uint8_t c) {
 }
 
 /// Words of a text, one after the other, with the line that they stand on.
-class WordReader {
+class WordReader : private TextWindow {
 public:
-    explicit WordReader(ByteReader& reader) : reader_(reader) {}
+    explicit WordReader(ByteReader& reader) : TextWindow(reader) {}
 
     void seek(const StlPlace& place) {
-        reader_.seek(place.offset);
+        TextWindow::seek(place.offset);
         line_ = place.line;
     }
-    uint64_t offset() const { return reader_.offset(); }
+    using TextWindow::offset;
     uint64_t line() const { return line_; }
 
     /// The next word, or "" at the end of the file; good until the next call.
     std::string_view next() {
-        skipBlanks();
-        const size_t size = std::min(reader_.peek(kLongestWord + 1), kLongestWord + 1);
-        const uint8_t* const word = reader_.data();
-        size_t length = 0;
-        while (length < size && !isBlank(word[length])) ++length;
-        if (length > kLongestWord)
-            fail(fmt::format("a word of more than {} characters", kLongestWord));
-        reader_.advance(length);
-        return {reinterpret_cast<const char*>(word), length};
+        const char* const word = skipBlanks();
+        int solid;
+        do {
+            solid = zerosBefore(solidBytes(loadEight(p_)) ^ eightTimes(0x80));
+            p_ += solid;
+        } while (solid == 8);
+        if (p_ - word > ptrdiff_t(kMaxWord))
+            fail(fmt::format("a word of more than {} characters", kMaxWord));
+        return {word, size_t(p_ - word)};
     }
 
     /// Passes over a word that must be `expected` (in lower case).
     void expect(std::string_view expected) {
-        const std::string_view word = next();
-        if (!isWord(word, expected)) failWord(word, fmt::format("\"{}\"", expected));
+        const char* const word = skipBlanks();
+        if (std::memcmp(word, expected.data(), expected.size()) == 0 &&
+            isBlank(uint8_t(word[expected.size()]))) [[likely]] {
+            p_ += expected.size();
+            return;
+        }
+        const std::string_view found = next();
+        if (!isWord(found, expected)) failWord(found, fmt::format("\"{}\"", expected));
     }
 
     double nextReal() {
-        const std::string_view word = next();
-        if (word.empty()) failWord(word, "a number");
+        const char* const word = skipBlanks();
         double value = 0;
-        const char* const end = word.data() + word.size();
-        if (parseReal(word.data(), end, value) != end) failWord(word, "a number");
+        const char* const after = parseReal(word, end_, value);
+        if (!after || !isBlank(uint8_t(*after))) [[unlikely]]
+            failWord(next(), "a number");
+        p_ = after;
         return value;
     }
 
     void skipLine() {
-        for (size_t size; (size = reader_.peek(1)) > 0; reader_.advance(size)) {
-            const uint8_t* const text = reader_.data();
-            size_t length = 0;
-            while (length < size && text[length] != '\n' && text[length] != '\r') ++length;
-            if (length == size) continue;
-            reader_.advance(length);
-            return;
+        for (;; ++p_) {
+            need();
+            if (p_ == end_ || *p_ == '\n' || *p_ == '\r') return;
         }
     }
 
@@ -86,33 +90,27 @@ public:
     }
     [[noreturn]] void failWord(std::string_view word, const std::string& expected) const {
         if (word.empty()) fail(fmt::format("the file ends where {} is expected", expected));
-        std::string shown(word.substr(0, 40));
-        for (char& c : shown)
-            if (c < ' ' || c > '~') c = '?';
-        fail(fmt::format("\"{}\" stands where {} is expected", shown, expected));
+        fail(fmt::format("\"{}\" stands where {} is expected", shownWord(word.data()), expected));
     }
 
 private:
-    static constexpr size_t kLongestWord = 255;
-
-    void skipBlanks() {
-        uint8_t before = 0;
-        for (size_t size; (size = reader_.peek(1)) > 0; reader_.advance(size)) {
-            const uint8_t* const text = reader_.data();
-            for (size_t i = 0; i < size; ++i) {
-                const uint8_t c = text[i];
-                if (!isBlank(c)) return reader_.advance(i);
-                if (c == '\r' || (c == '\n' && before != '\r')) ++line_;
-                before = c;
-            }
+    /// Moves to the next word, or the end of the file; returns where that is.
+    const char* skipBlanks() {
+        for (;;) {
+            need();
+            const char c = *p_;
+            if (!isBlank(uint8_t(c)) || p_ == end_) return p_;
+            ++p_;
+            // A pair of both is one end of a line, which its second counts.
+            if (c == '\n' || (c == '\r' && *p_ != '\n')) ++line_;
+            p_ += zerosBefore(loadEight(p_) ^ eightTimes(' '));
         }
     }
 
-    ByteReader& reader_;
     uint64_t line_ = 1;
 };
 
-class TextStl : public StlFacets<double> {
+class TextStl : public StlFacets {
 public:
     explicit TextStl(ByteReader& reader) : words_(reader) {}
 
@@ -190,7 +188,7 @@ bool beginsAsStlText(std::span<const uint8_t> head) {
            (text.size() == kSolid.size() || isBlank(uint8_t(text[kSolid.size()])));
 }
 
-std::unique_ptr<StlFacets<double>> openTextStl(ByteReader& reader) {
+std::unique_ptr<StlFacets> openTextStl(ByteReader& reader) {
     return std::make_unique<TextStl>(reader);
 }
 

@@ -25,6 +25,15 @@ struct VertexBatch {
     std::vector<Vec3f> normal;    ///< as in the file, or empty
     std::vector<Rgba8> colour;    ///< or empty
     std::vector<float> scalar;    ///< vertex-major, schema.scalars.size() a vertex, or empty
+
+    /// Empty, keeping its capacity; what follows begins at vertex number `first`.
+    void restart(uint64_t first_vertex) {
+        first = first_vertex;
+        position.clear();
+        normal.clear();
+        colour.clear();
+        scalar.clear();
+    }
 };
 
 struct TriangleBatch {
