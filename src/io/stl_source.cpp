@@ -21,7 +21,7 @@ public:
           facet_count_(facets_->count()),
           // A triangle takes some bytes, so a small file needs no large batch.
           batch_corners_(
-              3 * size_t(std::min<uint64_t>(kMaxBatch / 3, reader_->source().lengthBound()))) {
+              3 * size_t(std::min<uint64_t>(kBatchFacets, reader_->source().lengthBound()))) {
         reader_->release();
     }
 
@@ -45,6 +45,9 @@ public:
     bool readTriangles(TriangleBatch& batch) override;
 
 private:
+    /// Few enough that a batch stays in the processor's cache while it is used.
+    static constexpr uint64_t kBatchFacets = 8192;
+    static_assert(3 * kBatchFacets <= kMaxBatch);
     /// About as many bytes as writers spend on a facet of a text.
     static constexpr uint64_t kUsualTextBytes = 260;
 

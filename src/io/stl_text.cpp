@@ -51,15 +51,14 @@ public:
     }
 
     /// Passes over a word that must be `expected` (in lower case).
-    void expect(std::string_view expected) {
+    template <size_t N>
+    void expect(const char (&expected)[N]) {
+        constexpr size_t kLength = N - 1;
         const char* const word = skipBlanks();
-        if (std::memcmp(word, expected.data(), expected.size()) == 0 &&
-            isBlank(uint8_t(word[expected.size()]))) [[likely]] {
-            p_ += expected.size();
-            return;
-        }
-        const std::string_view found = next();
-        if (!isWord(found, expected)) failWord(found, fmt::format("\"{}\"", expected));
+        if (std::memcmp(word, expected, kLength) == 0 && isBlank(uint8_t(word[kLength]))) [[likely]]
+            p_ += kLength;
+        else if (const std::string_view found = next(); !isWord(found, expected))
+            failWord(found, fmt::format("\"{}\"", expected));
     }
 
     double nextReal() {
