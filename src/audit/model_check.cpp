@@ -62,7 +62,7 @@ private:
 
     void checkInput() {
         progress_.beginStage("input", 0);
-        source_ = openSource(settings_.input);
+        source_ = openSource(settings_.input, settings_.temp_dir);
         input_.emplace(*source_, budget_, budget_.available() / 3, settings_.temp_dir);
         survey_ = surveyInput(*input_, model_.info().lattice, budget_, budget_.available() / 2,
                               settings_.temp_dir);

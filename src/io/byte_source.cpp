@@ -1,14 +1,8 @@
 #include "io/byte_source.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 
-#include "base/error.h"
-#include "extmem/file.h"
 #include "io/packed_source.h"
 
 namespace pietra {
@@ -17,32 +11,21 @@ namespace {
 
 class PlainSource : public ByteSource {
 public:
-    explicit PlainSource(File file)
-        : path_(file.path()), file_(std::move(file)), size_(file_.size()) {
-        expectSequentialReads();
-    }
-    const std::string& path() const override { return path_; }
+    PlainSource(InputFile file, uint64_t stored_bytes)
+        : file_(std::move(file)), stored_bytes_(stored_bytes) {}
+    const std::string& path() const override { return file_.path(); }
     size_t read(uint64_t offset, void* data, size_t bytes) override {
-        if (!file_.isOpen()) {
-            file_ = reopenUnchanged(path_, size_);
-            expectSequentialReads();
-        }
-        return file_.readSomeAt(offset, data, bytes);
+        return file_.read(offset, data, bytes);
     }
-    uint64_t lengthBound() const override { return size_; }
-    uint64_t storedBytes() const override { return size_; }
+    uint64_t lengthBound() const override { return file_.size(); }
+    uint64_t storedBytes() const override { return stored_bytes_; }
     bool isCompressed() const override { return false; }
-    void release() override { file_.close(); }
-    std::unique_ptr<ByteSource> again() const override { return openBytes(path_); }
+    void release() override { file_.release(); }
+    std::unique_ptr<ByteSource> again() const override { return openPlain(file_, stored_bytes_); }
 
 private:
-    void expectSequentialReads() {
-        ::posix_fadvise(file_.descriptor(), 0, 0, POSIX_FADV_SEQUENTIAL);
-    }
-
-    std::string path_;
-    File file_;
-    uint64_t size_;
+    InputFile file_;
+    uint64_t stored_bytes_;
 };
 
 class MemorySource : public ByteSource {
@@ -68,24 +51,15 @@ private:
 
 }  // namespace
 
-std::unique_ptr<ByteSource> openBytes(const std::string& path) {
-    // note: looked at before it is opened: opening a pipe would wait for its writer.
-    struct stat info {};
-    if (::stat(path.c_str(), &info) != 0) throw IoError(path, "open", errno);
-    if (S_ISDIR(info.st_mode)) throw IoError(path, "open", EISDIR);
-    if (!S_ISREG(info.st_mode))
-        throw InputError(path, "",
-                         "a pipe or device cannot be read several times, as a mesh must be; "
-                         "save it to a file first");
-    File file(path, File::Mode::kRead);
+std::unique_ptr<ByteSource> openBytes(const std::string& path, const std::string& temp_dir) {
+    InputFile file(path, temp_dir);
     if (auto packed = openPacked(file)) return packed;
-    return std::make_unique<PlainSource>(std::move(file));
+    const uint64_t stored_bytes = file.size();
+    return openPlain(std::move(file), stored_bytes);
 }
 
-File reopenUnchanged(const std::string& path, uint64_t bytes) {
-    File file(path, File::Mode::kRead);
-    if (file.size() != bytes) throw InputError(path, "", "has changed while it was read");
-    return file;
+std::unique_ptr<ByteSource> openPlain(InputFile file, uint64_t stored_bytes) {
+    return std::make_unique<PlainSource>(std::move(file), stored_bytes);
 }
 
 std::unique_ptr<ByteSource> bytesInMemory(const std::string& name, std::vector<uint8_t> bytes) {

@@ -34,11 +34,14 @@ public:
     virtual void release() {}
     /// The same bytes once more, to be read at another place at the same time.
     virtual std::unique_ptr<ByteSource> again() const = 0;
+    /// The same plain bytes, to be read in any order: of a packed file, a copy in a temporary one.
+    virtual std::unique_ptr<ByteSource> unpacked() { return again(); }
 };
 
-/// Opens a regular file; packed ones are recognised by their magic bytes. Throws IoError (cannot
-/// open), InputError (a pipe or device: a mesh is read several times).
-std::unique_ptr<ByteSource> openBytes(const std::string& path);
+/// Opens a file; packed ones are recognised by their magic bytes. As a mesh is read several times,
+/// a pipe is first copied to a temporary file without a name, in the folder `temp_dir`. Throws
+/// IoError (cannot open, no room for the copy), InputError (a device), Interrupted (in a pipe).
+std::unique_ptr<ByteSource> openBytes(const std::string& path, const std::string& temp_dir = ".");
 
 /// Bytes that are already there, for tests and fuzzing; `name` stands for the path.
 std::unique_ptr<ByteSource> bytesInMemory(const std::string& name, std::vector<uint8_t> bytes);

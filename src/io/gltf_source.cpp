@@ -368,20 +368,19 @@ bool isGlb(std::span<const uint8_t> head) {
 
 }  // namespace
 
-bool isGltf(std::span<const uint8_t> head, const std::string& name) {
-    if (isGlb(head)) return true;
-    std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+bool isGltf(const FileSigns& signs) {
+    if (isGlb(signs.head)) return true;
+    std::string_view text = signs.text();
     if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
     const size_t first = text.find_first_not_of(" \t\r\n");
     if (first == text.npos || text[first] != '{') return false;
-    return name.ends_with(".gltf") || text.find("\"asset\"") != text.npos;
+    return signs.name.ends_with(".gltf") || text.find("\"asset\"") != text.npos;
 }
 
 std::unique_ptr<TriangleSource> openGltf(std::unique_ptr<ByteReader> reader) {
+    // Its parts are read in turns.
     if (reader->source().isCompressed())
-        throw InputError(reader->path(), "",
-                         "is a compressed glTF file: its parts are read in turns, so unpack it "
-                         "first");
+        reader = std::make_unique<ByteReader>(reader->takeSource()->unpacked());
     GlbParts parts;
     parts.json_end = reader->source().lengthBound();
     if (reader->peek(kMagic.size()) >= kMagic.size() && isGlb({reader->data(), kMagic.size()}))

@@ -12,14 +12,14 @@
 // compressed as a whole are refused, for their parts are read in turns.
 
 #include <memory>
-#include <span>
 
 #include "io/byte_reader.h"
+#include "io/file_signs.h"
 #include "io/triangle_source.h"
 
 namespace pietra {
 
-bool isGltf(std::span<const uint8_t> head, const std::string& name);
+bool isGltf(const FileSigns& signs);
 
 /// Throws InputError, or IoError where a file beside it cannot be read.
 std::unique_ptr<TriangleSource> openGltf(std::unique_ptr<ByteReader> reader);

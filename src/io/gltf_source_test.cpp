@@ -484,25 +484,6 @@ TEST(GltfSource, keepsAttributesThatAllPrimitivesHave) {
                   "custom attributes that are no scalars are left out"}));
 }
 
-TEST(GltfSource, streamsCanBeReadInAnyOrderAgain) {
-    const ScratchDirectory dir;
-    const auto source = openSource({dir.write("a.glb", plainGrid(Grid{300}).glb())});
-    const WholeMesh first = readWhole(*source);
-    TriangleBatch triangles;
-    VertexBatch vertices;
-    source->rewindTriangles();
-    ASSERT_TRUE(source->readTriangles(triangles));
-    source->rewindVertices();
-    ASSERT_TRUE(source->readVertices(vertices));
-    const auto second = triangles.triangle.size();
-    ASSERT_TRUE(source->readTriangles(triangles));
-    EXPECT_EQ(triangles.first, second);
-    EXPECT_EQ(triangles.triangle[0], first.triangles[second]);
-    ASSERT_TRUE(source->readVertices(vertices));
-    EXPECT_EQ(vertices.position[0], first.vertices.position[vertices.first]);
-    expectSameMesh(first, readWhole(*source));
-}
-
 TEST(GltfSource, readsWhatTheWriterWrites) {
     const ScratchDirectory dir;
     MeshOutput output;
@@ -752,12 +733,8 @@ TEST(GltfSource, survivesAnyChangeOfAByte) {
         }
 }
 
-TEST(GltfSource, refusesWholeFilesThatAreCompressed) {
+TEST(GltfSource, refusesPackedFilesBesideIt) {
     const ScratchDirectory dir;
-    const std::string path = dir.write("a.glb.gz", gzipped(triangle().glb()));
-    EXPECT_EQ(faultOf(path), path +
-                                 ": is a compressed glTF file: its parts are read in turns, so "
-                                 "unpack it first");
     const Builder b = triangle();
     const std::string data = dir.write("data.bin", gzipped(b.data));
     EXPECT_EQ(faultOf(dir.write("a.gltf", b.gltf("data.bin"))),

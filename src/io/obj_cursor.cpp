@@ -49,8 +49,8 @@ size_t wordsBetween(const char* p, const char* end) {
     return count;
 }
 
-/// As parseInteger(), where the number is often that whose text is [known, known + size), known_index:
-/// most files give a corner the same index of everything.
+/// As parseInteger(), where the number is often that whose text is [known, known + size),
+/// known_index: most files give a corner the same index of everything.
 const char* takeLikelyIndex(const char* p, const char* known, size_t size, int64_t known_index,
                             int64_t& index) {
     const uint64_t differs = loadEight(p) ^ loadEight(known);

@@ -297,9 +297,9 @@ uint64_t ObjSource::indexOf(const ObjCorner& corner) const {
 
 }  // namespace
 
-bool isObj(std::span<const uint8_t> head, const std::string& name) {
-    if (name.ends_with(".obj")) return true;
-    const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+bool isObj(const FileSigns& signs) {
+    if (signs.name.ends_with(".obj")) return true;
+    const std::string_view text = signs.text();
     bool found = false;
     for (size_t begin = 0, end; (end = text.find_first_of("\r\n", begin)) != text.npos;
          begin = end + 1) {

@@ -23,15 +23,15 @@
 // the file, of its lines or of its faces.
 
 #include <memory>
-#include <span>
 
 #include "io/byte_reader.h"
+#include "io/file_signs.h"
 #include "io/triangle_source.h"
 
 namespace pietra {
 
 /// By the name, or by whole lines that are all statements of the format.
-bool isObj(std::span<const uint8_t> head, const std::string& name);
+bool isObj(const FileSigns& signs);
 
 /// Throws InputError where the file holds what is no statement, or has no vertices or no faces.
 std::unique_ptr<TriangleSource> openObj(std::unique_ptr<ByteReader> reader);

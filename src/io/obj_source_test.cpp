@@ -229,23 +229,6 @@ TEST(ObjSource, readsMoreThanABatchAndAWindow) {
     expectModel(readWhole(*openText(spelled.text(), 1)), model);
 }
 
-TEST(ObjSource, streamsCanBeReadInAnyOrderAgain) {
-    const Model model = Model::random(7, 70000, 140000, true, false);
-    const auto source = openText(Speller(model, 4).text());
-    VertexBatch vertices;
-    TriangleBatch triangles;
-    ASSERT_TRUE(source->readTriangles(triangles));
-    ASSERT_TRUE(source->readVertices(vertices));
-    const size_t second = triangles.triangle.size();
-    ASSERT_TRUE(source->readTriangles(triangles));  // goes on where it was
-    EXPECT_EQ(triangles.first, second);
-    EXPECT_EQ(triangles.triangle[0], model.triangles[second]);
-    ASSERT_TRUE(source->readVertices(vertices));
-    EXPECT_EQ(vertices.position[0], model.positions[vertices.first]);
-    EXPECT_EQ(vertices.normal[0], model.normals[vertices.first]);
-    expectModel(readWhole(*source), model);
-}
-
 TEST(ObjSource, carriesOnlyNormalsThatMatchTheVertices) {
     const std::string points = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
     const std::string normals = "vn 0 0 1\nvn 0 1 0\nvn 1 0 0\n";

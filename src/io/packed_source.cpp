@@ -166,11 +166,9 @@ constexpr Packer kZstd{"zstd", 32768, make<ZstdUnpacker>};
 
 class PackedSource : public ByteSource {
 public:
-    PackedSource(File file, const Packer& packer)
-        : packer_(packer), path_(file.path()), file_(std::move(file)), size_(file_.size()) {}
-    const std::string& path() const override { return path_; }
+    PackedSource(const InputFile& file, const Packer& packer) : packer_(packer), file_(file) {}
+    const std::string& path() const override { return file_.path(); }
     size_t read(uint64_t offset, void* data, size_t bytes) override {
-        if (!file_.isOpen()) file_ = reopenUnchanged(path_, size_);
         if (!unpacker_) {
             buffer_.resize(kInputBytes);
             unpacker_ = packer_.unpacker();
@@ -181,17 +179,28 @@ public:
     }
     uint64_t lengthBound() const override {
         const uint64_t ratio = packer_.largest_ratio;
-        return size_ > UINT64_MAX / ratio ? UINT64_MAX : size_ * ratio;
+        return file_.size() > UINT64_MAX / ratio ? UINT64_MAX : file_.size() * ratio;
     }
-    uint64_t storedBytes() const override { return size_; }
+    uint64_t storedBytes() const override { return file_.size(); }
     bool isCompressed() const override { return true; }
     void release() override {
         unpacker_.reset();
         std::vector<uint8_t>().swap(buffer_);
         forgetPlace();
-        file_.close();
+        file_.release();
     }
-    std::unique_ptr<ByteSource> again() const override { return openBytes(path_); }
+    std::unique_ptr<ByteSource> again() const override {
+        return std::make_unique<PackedSource>(file_, packer_);
+    }
+    std::unique_ptr<ByteSource> unpacked() override {
+        uint64_t offset = 0;
+        InputFile plain = file_.copied([&](std::span<uint8_t> block) {
+            const size_t n = read(offset, block.data(), block.size());
+            offset += n;
+            return n;
+        });
+        return openPlain(std::move(plain), file_.size());
+    }
 
 private:
     void restart() {
@@ -214,7 +223,7 @@ private:
 
     void fillInput() {
         if (!input_.empty()) return;
-        const size_t n = file_.readSomeAt(input_end_, buffer_.data(), buffer_.size());
+        const size_t n = file_.read(input_end_, buffer_.data(), buffer_.size());
         input_ = {buffer_.data(), n};
         input_end_ += n;
     }
@@ -253,9 +262,7 @@ private:
     }
 
     const Packer& packer_;
-    std::string path_;
-    File file_;
-    uint64_t size_;
+    InputFile file_;
     std::unique_ptr<Unpacker> unpacker_;
     std::vector<uint8_t> buffer_;
     std::span<const uint8_t> input_;  ///< packed bytes that the unpacker has not seen
@@ -266,10 +273,10 @@ private:
 
 }  // namespace
 
-std::unique_ptr<ByteSource> openPacked(File& file) {
+std::unique_ptr<ByteSource> openPacked(InputFile& file) {
     using namespace std::string_view_literals;
     char bytes[6] = {};
-    const std::string_view magic(bytes, file.readSomeAt(0, bytes, sizeof bytes));
+    const std::string_view magic(bytes, file.read(0, bytes, sizeof bytes));
     const Packer* packer = nullptr;
     if (magic.starts_with("\x1f\x8b"sv)) packer = &kGzip;
     if (magic.starts_with("\xfd\x37zXZ\0"sv)) packer = &kXz;
@@ -278,7 +285,7 @@ std::unique_ptr<ByteSource> openPacked(File& file) {
                          magic.substr(1).starts_with("\x2a\x4d\x18"sv);
     if (magic.starts_with("\x28\xb5\x2f\xfd"sv) || skipped) packer = &kZstd;
     if (!packer) return nullptr;
-    return std::make_unique<PackedSource>(std::move(file), *packer);
+    return std::make_unique<PackedSource>(file, *packer);
 }
 
 }  // namespace pietra

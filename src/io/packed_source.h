@@ -9,15 +9,15 @@
 
 #include <memory>
 
-#include "extmem/file.h"
 #include "io/byte_source.h"
+#include "io/input_file.h"
 
 namespace pietra {
 
-/// The source of a file that begins with the magic bytes of a packer, else null and `file` stays.
-std::unique_ptr<ByteSource> openPacked(File& file);
+/// The source of a file that begins with the magic bytes of a packer, else null.
+std::unique_ptr<ByteSource> openPacked(InputFile& file);
 
-/// Opens a file again that had so many bytes. Throws InputError where it has not any more.
-File reopenUnchanged(const std::string& path, uint64_t bytes);
+/// The source of a file that is not packed; `stored_bytes` stand for it on disk.
+std::unique_ptr<ByteSource> openPlain(InputFile file, uint64_t stored_bytes);
 
 }  // namespace pietra

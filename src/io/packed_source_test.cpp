@@ -36,7 +36,7 @@ std::string zstd(const std::string& text) {
 
 struct Packer {
     const char* name;
-    std::string (*pack)(const std::string&);
+    std::string (*pack)(const std::string& text);
 };
 constexpr Packer kPackers[] = {{"gzip", gzipped}, {"xz", xz}, {"zstd", zstd}};
 
@@ -153,20 +153,8 @@ TEST(PackedSource, refusesHugeWindows) {
         ": the zstd data needs more than 128 MiB of memory: unpack it first"));
 }
 
-TEST(PackedSource, carriesEveryFormat) {
+TEST(PackedSource, namesAnEmptyFile) {
     const ScratchDirectory dir;
-    const std::string obj =
-        "v 0 0 0\nvn 0 0 1\nv 1 0 0\nvn 0 0 1\nv 0 1 0\nvn 0 1 0\n"
-        "f 1//1 2//2 3//3\n";
-    const std::string ply =
-        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
-        "property float z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n"
-        "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
-    for (const std::string& text : {obj, ply}) {
-        const WholeMesh plain = readWhole(dir.write("a", text));
-        for (const Packer& packer : kPackers)
-            expectSameMesh(readWhole(dir.write("b", packer.pack(text))), plain);
-    }
     EXPECT_EQ(faultOf(dir.write("a.obj.zst", zstd(""))),
               dir.file("a.obj.zst") + ": the file is empty");
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <string_view>
 
 #include "base/error.h"
 #include "io/ply_cursor.h"
@@ -218,9 +219,9 @@ void PlySource::checkRest() {
 
 }  // namespace
 
-bool isPly(std::span<const uint8_t> head, const std::string&) {
-    return head.size() >= 4 && head[0] == 'p' && head[1] == 'l' && head[2] == 'y' &&
-           (head[3] == '\n' || head[3] == '\r' || head[3] == ' ' || head[3] == '\t');
+bool isPly(const FileSigns& signs) {
+    const std::string_view text = signs.text();
+    return text.size() > 3 && text.starts_with("ply") && isBlankOrLineEnd(text[3]);
 }
 
 std::unique_ptr<TriangleSource> openPly(std::unique_ptr<ByteReader> reader) {

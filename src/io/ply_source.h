@@ -5,14 +5,14 @@
 // before it, once.
 
 #include <memory>
-#include <span>
 
 #include "io/byte_reader.h"
+#include "io/file_signs.h"
 #include "io/triangle_source.h"
 
 namespace pietra {
 
-bool isPly(std::span<const uint8_t> head, const std::string& name);
+bool isPly(const FileSigns& signs);
 
 /// Throws InputError where the header is bad, counts more than the file can hold, or has no
 /// vertices or no faces.

@@ -381,32 +381,6 @@ TEST(PlySource, unrollsStrips) {
         }
 }
 
-TEST(PlySource, streamsCanBeReadInAnyOrderAgain) {
-    const ScratchDirectory dir;
-    const Grid grid{260};
-    for (const auto encoding : kEncodings) {
-        const std::string text = plainGrid(grid, encoding);
-        for (const std::string& path :
-             {dir.write("a.ply", text), dir.write("a.ply.gz", gzipped(text))}) {
-            const auto source = openSource({path});
-            const WholeMesh first = readWhole(*source);
-            TriangleBatch triangles;
-            VertexBatch vertices;
-            source->rewindTriangles();
-            ASSERT_TRUE(source->readTriangles(triangles));
-            source->rewindVertices();
-            ASSERT_TRUE(source->readVertices(vertices));
-            const auto second = triangles.triangle.size();
-            ASSERT_TRUE(source->readTriangles(triangles));  // goes on where it was
-            EXPECT_EQ(triangles.first, second);
-            EXPECT_EQ(triangles.triangle[0], first.triangles[second]);
-            ASSERT_TRUE(source->readVertices(vertices));
-            EXPECT_EQ(vertices.position[0], first.vertices.position[vertices.first]);
-            expectSameMesh(first, readWhole(*source));
-        }
-    }
-}
-
 TEST(PlySource, joinsManyFilesInTheMemoryOfOne) {
     const ScratchDirectory dir;
     const std::string path = dir.write("a.ply", plainGrid(Grid{250}, PlyBuilder::kLittle));
@@ -596,13 +570,9 @@ TEST(PlySource, refusesCountsThatTheFileCannotHold) {
             }
 }
 
-TEST(PlySource, neverWaitsForAPipe) {
+TEST(PlySource, namesWhatIsNoFile) {
     const ScratchDirectory dir;
-    const std::string pipe = dir.file("pipe.ply");
-    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-    EXPECT_EQ(faultOf(pipe), pipe +
-                                 ": a pipe or device cannot be read several times, as a mesh must "
-                                 "be; save it to a file first");
+    EXPECT_EQ(faultOf("/dev/zero"), "/dev/zero: is a device, not a file");
     EXPECT_EQ(faultOf(dir.path()), dir.path() + ": cannot open: Is a directory");
     EXPECT_EQ(faultOf(dir.file("none")),
               dir.file("none") + ": cannot open: No such file or directory");

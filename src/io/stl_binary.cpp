@@ -135,17 +135,15 @@ private:
     size_t bytes_after_ = 0;
 };
 
-/// Whether the size is exactly that of a binary file with the count in its header.
-bool sizeFits(ByteReader& reader) {
-    if (reader.source().isCompressed() || reader.peek(kHeaderBytes) < kHeaderBytes) return false;
-    const uint64_t count = loadCount(reader.data());
-    return reader.source().lengthBound() == kHeaderBytes + count * kFacetBytes;
-}
-
 }  // namespace
 
 std::unique_ptr<StlFacets> openBinaryStl(ByteReader& reader) {
     return std::make_unique<BinaryStl>(reader);
+}
+
+bool isBinaryStlSize(std::span<const uint8_t> head, uint64_t bytes) {
+    return head.size() >= kHeaderBytes &&
+           bytes == kHeaderBytes + uint64_t(loadCount(head.data())) * kFacetBytes;
 }
 
 bool isStlText(ByteReader& reader) {
@@ -153,8 +151,9 @@ bool isStlText(ByteReader& reader) {
     reader.seek(0);
     const size_t size = std::min(reader.peek(kHead), kHead);
     const std::span<const uint8_t> head(reader.data(), size);
+    const uint64_t bytes = reader.source().isCompressed() ? 0 : reader.source().lengthBound();
     // Text has no zero bytes; binary data has them in the attributes of the first facets.
-    return beginsAsStlText(head) && !sizeFits(reader) &&
+    return beginsAsStlText(head) && !isBinaryStlSize(head, bytes) &&
            std::find(head.begin(), head.end(), 0) == head.end();
 }
 

@@ -41,6 +41,10 @@ public:
 /// Whether a file that begins with `head` may be a text: its first word is "solid".
 bool beginsAsStlText(std::span<const uint8_t> head);
 
+/// Whether a file of `bytes` that begins with `head` has just the size that the count of a binary
+/// file asks for.
+bool isBinaryStlSize(std::span<const uint8_t> head, uint64_t bytes);
+
 /// Whether an STL file is text: it begins with "solid", but so do some binary files.
 bool isStlText(ByteReader& reader);
 

@@ -68,6 +68,8 @@ size_t StlSource::readBlock(StlPlace& place, std::vector<Vec3d>& corners) {
     corners.resize(batch_corners_);
     const size_t facets = facets_->read(place, corners);
     corners.resize(3 * facets);
+    if (facet_count_ && (facets == 0 ? place.facet != *facet_count_ : place.facet > *facet_count_))
+        throw InputError(reader_->path(), "", "has changed while it was read");
     if (facets == 0) {
         if (place.facet == 0)
             throw InputError(reader_->path(), "", "has no triangles: nothing to show");
@@ -106,8 +108,9 @@ bool StlSource::readTriangles(TriangleBatch& batch) {
 
 }  // namespace
 
-bool isStl(std::span<const uint8_t> head, const std::string& name) {
-    return beginsAsStlText(head) || name.ends_with(".stl");
+bool isStl(const FileSigns& signs) {
+    return beginsAsStlText(signs.head) || signs.name.ends_with(".stl") ||
+           isBinaryStlSize(signs.head, signs.bytes);
 }
 
 std::unique_ptr<TriangleSource> openStl(std::unique_ptr<ByteReader> reader) {

@@ -6,15 +6,15 @@
 // KiB and the caller's batch.
 
 #include <memory>
-#include <span>
 
 #include "io/byte_reader.h"
+#include "io/file_signs.h"
 #include "io/triangle_source.h"
 
 namespace pietra {
 
-/// Text files by content, binary ones, which have no magic bytes, by name.
-bool isStl(std::span<const uint8_t> head, const std::string& name);
+/// Text files by content, binary ones, which have no magic bytes, by their size or name.
+bool isStl(const FileSigns& signs);
 
 /// Throws InputError as openBinaryStl() does.
 std::unique_ptr<TriangleSource> openStl(std::unique_ptr<ByteReader> reader);

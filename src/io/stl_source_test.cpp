@@ -130,28 +130,6 @@ TEST(StlSource, keepsDoublesOfATextWhole) {
     EXPECT_EQ(soupOf(readWhole(dir.write("a.stl", textStl(soup)))), soup);
 }
 
-TEST(StlSource, streamsCanBeReadInAnyOrderAgain) {
-    const ScratchDirectory dir;
-    const Soup soup = randomSoup(70000);
-    for (const std::string& text : {binaryStl(soup), textStl(soup, {.solids = 3})}) {
-        const auto source = openSource({dir.write("a.stl", text)});
-        TriangleBatch triangles;
-        VertexBatch vertices;
-        ASSERT_TRUE(source->readVertices(vertices));
-        ASSERT_TRUE(source->readTriangles(triangles));
-        const auto second = vertices.position.size();
-        ASSERT_TRUE(source->readVertices(vertices));  // goes on where it was
-        EXPECT_EQ(vertices.first, second);
-        EXPECT_EQ(vertices.position[0], soup[second / 3][second % 3]);
-        EXPECT_EQ(source->vertexCount(), 3 * soup.size());
-        const uint64_t third = vertices.first + vertices.position.size();
-        ASSERT_TRUE(source->readVertices(vertices));
-        EXPECT_EQ(vertices.first, third);
-        for (int i = 0; i < 2; ++i) EXPECT_EQ(soupOf(readWhole(*source)), soup);
-        EXPECT_EQ(source->triangleCountHint(), soup.size());
-    }
-}
-
 TEST(StlSource, notesWhatItLeavesOut) {
     const ScratchDirectory dir;
     const Soup soup = randomSoup(10);

@@ -68,10 +68,13 @@ public:
     virtual bool readTriangles(TriangleBatch& batch) = 0;
 };
 
-/// Opens one or several files as one model, by content (magic bytes), not by name alone. Throws
-/// IoError (cannot open), InputError (no known format, bad header).
-std::unique_ptr<TriangleSource> openSource(const std::vector<std::string>& paths);
-/// Throws what openSource() throws where a file is of no known format. Reads its first bytes alone.
+/// Opens one or several files as one model, by content (magic bytes), not by name alone. Pipes, and
+/// packed files of a format that is read in turns (glTF), are copied to temporary files in the
+/// folder `temp_dir`. Throws IoError (cannot open), InputError (no known format, bad header).
+std::unique_ptr<TriangleSource> openSource(const std::vector<std::string>& paths,
+                                           const std::string& temp_dir = ".");
+/// Throws what openSource() throws where a file is of no known format, also for a pipe, which a
+/// later openSource() would find empty. Reads the first bytes alone.
 void checkMeshFormat(const std::string& path);
 
 }  // namespace pietra

@@ -230,7 +230,7 @@ void BuildVerb::summarise(const BuildReport& result, double seconds) const {
 int BuildVerb::run(const RunContext& context) {
     const auto start = std::chrono::steady_clock::now();
     const BuildSettings build_settings = settings(context);
-    const auto source = openSource(inputs_);
+    const auto source = openSource(inputs_, build_settings.temp_dir);
     if (dry_run_) return dryRun(*source, build_settings);
     const BuildReport result =
         findMethod(method_)->build(*source, build_settings, context.progress);
