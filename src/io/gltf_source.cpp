@@ -370,8 +370,7 @@ bool isGlb(std::span<const uint8_t> head) {
 
 bool isGltf(const FileSigns& signs) {
     if (isGlb(signs.head)) return true;
-    std::string_view text = signs.text();
-    if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
+    const std::string_view text = signs.text();
     const size_t first = text.find_first_not_of(" \t\r\n");
     if (first == text.npos || text[first] != '{') return false;
     return signs.name.ends_with(".gltf") || text.find("\"asset\"") != text.npos;

@@ -44,7 +44,7 @@ InputFile::InputFile(const std::string& path, const std::string& temp_dir)
     struct stat info {};
     if (::stat(path.c_str(), &info) != 0) throw IoError(path, "open", errno);
     if (S_ISCHR(info.st_mode) || S_ISBLK(info.st_mode))
-        throw InputError(path, "", "is a device, not a file");
+        throw InputError(path, "", "is a device, not a file or pipe");
     file_ = openFile(path);
     size_ = file_->size();
     if (file_->isRegular()) return;

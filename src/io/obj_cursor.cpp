@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "io/file_signs.h"
 
 namespace pietra {
 
@@ -68,7 +69,6 @@ ObjPlace ObjCursor::start() {
     const size_t size = reader_.peek(ByteReader::kWindow);
     const std::string_view text(reinterpret_cast<const char*>(reader_.data()), size);
     line_end_ = text.find('\r') != text.npos && text.find('\n') == text.npos ? '\r' : '\n';
-    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
     seek({text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0, 1});
     return place();
 }

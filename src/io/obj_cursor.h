@@ -34,6 +34,7 @@ enum class ObjWord : uint8_t {
     kPoint,     ///< p
     kMaterial,  ///< usemtl, mtllib and what else says how a surface looks
     kFreeForm,  ///< curves and surfaces
+    kPaint,     ///< "#MRGB": ZBrush's colours, in comments
     kGroup,     ///< groups, names, smoothing, display attributes: nothing that is shown
     kUnknown
 };
@@ -156,6 +157,7 @@ inline bool ObjCursor::nextStatement(ObjWord& word) {
         const char c = *p_;
         if (static_cast<unsigned char>(c) > ' ') {
             if (c == '#') {
+                if (std::memcmp(p_, "#MRGB", 5) == 0) return word = ObjWord::kPaint, true;
                 skipComment();
                 continue;
             }

@@ -36,7 +36,8 @@ private:
     uint64_t block_bytes_;
     bool normals_match_ = true;
     double largest_colour_ = 0;
-    uint64_t textures_ = 0, lines_ = 0, points_ = 0, materials_ = 0, free_forms_ = 0, unknown_ = 0;
+    uint64_t textures_ = 0, lines_ = 0, points_ = 0, materials_ = 0, paints_ = 0, free_forms_ = 0,
+             unknown_ = 0;
     std::string first_unknown_;
 };
 
@@ -94,6 +95,9 @@ void Surveyor::take(ObjWord word) {
             break;
         case ObjWord::kMaterial:
             ++materials_;
+            break;
+        case ObjWord::kPaint:
+            ++paints_;
             break;
         case ObjWord::kFreeForm:
             ++free_forms_;
@@ -154,6 +158,7 @@ std::vector<std::string> Surveyor::notes() const {
             "from the triangles");
     if (textures_ > 0) notes.push_back("texture coordinates are left out");
     if (materials_ > 0) notes.push_back("materials are left out");
+    if (paints_ > 0) notes.push_back("the colours in comments (#MRGB) are left out");
     if (lines_ + points_ > 0)
         notes.push_back(
             fmt::format("{} lines and {} statements of points are left out", lines_, points_));

@@ -8,6 +8,7 @@
 
 #include "base/check.h"
 #include "base/error.h"
+#include "io/file_signs.h"
 
 namespace pietra {
 
@@ -37,6 +38,7 @@ public:
         reader.seek(0);
         const size_t size = std::min(reader.peek(kMaxPlyHeader), kMaxPlyHeader);
         text_ = {reinterpret_cast<const char*>(reader.data()), size};
+        if (text_.starts_with(kByteOrderMark)) position_ = kByteOrderMark.size();
         // note: which line end the file uses must be decided before the last line, or a binary body
         // that begins with the byte 10 would lose it.
         const size_t first_end = text_.find_first_of("\r\n");

@@ -572,7 +572,7 @@ TEST(PlySource, refusesCountsThatTheFileCannotHold) {
 
 TEST(PlySource, namesWhatIsNoFile) {
     const ScratchDirectory dir;
-    EXPECT_EQ(faultOf("/dev/zero"), "/dev/zero: is a device, not a file");
+    EXPECT_EQ(faultOf("/dev/zero"), "/dev/zero: is a device, not a file or pipe");
     EXPECT_EQ(faultOf(dir.path()), dir.path() + ": cannot open: Is a directory");
     EXPECT_EQ(faultOf(dir.file("none")),
               dir.file("none") + ": cannot open: No such file or directory");

@@ -71,8 +71,6 @@ double colourScale(PlyType declared) {
             return 255;
         case PlyType::kUint16:
             return 255.0 / 65535.0;
-        case PlyType::kUint32:
-            return 255.0 / 4294967295.0;
         default:
             return 1;
     }

@@ -3,9 +3,10 @@
 // conversion by column.
 //
 // x y z are required. nx ny nz (all three) are the normal; red green blue [alpha], with or without
-// "diffuse_" in front, or r g b [a], the colour: 8-bit as they are, wider unsigned integers and
-// reals in [0, 1] scaled. Texture coordinates (s t, u v, texture_u texture_v) and lists are left
-// out, with a note; every other property is a scalar attribute of its name.
+// "diffuse_" in front, or r g b [a], the colour: reals in [0, 1] and 16-bit values are
+// scaled to [0, 255], other integers taken as they are. Texture coordinates (s t, u v, texture_u
+// texture_v) and lists are left out, with a note; every other property is a scalar attribute of its
+// name.
 
 #include <array>
 #include <cstdint>

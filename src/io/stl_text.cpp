@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "io/file_signs.h"
 #include "io/number_parser.h"
 #include "io/stl_facets.h"
 #include "io/text_window.h"
@@ -137,7 +138,7 @@ private:
             std::string_view word = words_.next();
             if (!place.in_solid) {
                 if (word.empty()) return false;
-                if (place.facet == 0 && word.starts_with("\xef\xbb\xbf")) word.remove_prefix(3);
+                if (place.facet == 0) word = withoutMark(word);
                 if (!WordReader::isWord(word, "solid")) words_.failWord(word, "\"solid\"");
                 words_.skipLine();
                 place.in_solid = true;
@@ -178,9 +179,8 @@ private:
 }  // namespace
 
 bool beginsAsStlText(std::span<const uint8_t> head) {
-    constexpr std::string_view kMark = "\xef\xbb\xbf", kSolid = "solid";
-    std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
-    if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
+    constexpr std::string_view kSolid = "solid";
+    std::string_view text = FileSigns{head, "", 0}.text();
     while (!text.empty() && isBlank(uint8_t(text.front()))) text.remove_prefix(1);
     return text.size() >= kSolid.size() &&
            WordReader::isWord(text.substr(0, kSolid.size()), kSolid) &&

@@ -54,6 +54,7 @@ ModelInfo infoFrom(const FileHeader& header) {
 }  // namespace
 
 ModelReader::ModelReader(const std::string& path) : file_(path, File::Mode::kRead) {
+    if (!file_.isRegular()) throw InputError(path, "", "is a pipe or device, not a file");
     FileHeader header;
     readHeader(header);
     info_ = infoFrom(header);

@@ -178,13 +178,19 @@ class Refusals(CommandLineTest):
                 self.build(name, "out.pietra", "--force", "--quiet")
                 self.assertEqual(self.run_pietra("check", "out.pietra").returncode, 0)
 
-    def test_a_name_that_is_no_text(self):
-        name = os.fsencode(self.folder) + b"/\xff\xfe.ply"
-        with open(name, "wb") as file:
-            file.write(mesh_forms.ply(*TETRAHEDRON))
-        run = subprocess.run([command_line_test.PIETRA, "build", name, "-o", "out.pietra"],
-                             cwd=self.folder, capture_output=True, timeout=60)
-        self.assertEqual(run.returncode, 0, run.stderr)
+    def test_names_of_any_bytes(self):
+        v, f = TETRAHEDRON
+        for name, data in ((b"\xff\xfe.ply", mesh_forms.ply(v, f)),
+                           (b" a\xffb 'c\".obj", mesh_forms.obj(v, f)),
+                           (b"-\n.stl", mesh_forms.stl(v, f)), (b"%20\xc3.glb", mesh_forms.glb(v, f))):
+            path = os.fsencode(self.folder) + b"/" + name
+            with open(path, "wb") as file:
+                file.write(data)
+            for verb in (["build", path, "-o", path + b".pietra"], ["check", path + b".pietra"],
+                         ["render", path + b".pietra", "-o", path + b".png", "--size", "64x64"]):
+                run = subprocess.run([command_line_test.PIETRA, *verb], cwd=self.folder,
+                                     capture_output=True, timeout=60)
+                self.assertEqual(run.returncode, 0, run.stderr)
 
     def test_no_room_for_the_output(self):
         self.write("m.ply", mesh_forms.ply(VERTICES, FACES))
@@ -208,15 +214,37 @@ class Refusals(CommandLineTest):
         self.write("m.ply", mesh_forms.ply(VERTICES, FACES))
         self.build("m.ply", "m.pietra", "--leaf-triangles", "300", "--patch-triangles", "200")
         whole = self.read("m.pietra")
+        os.mkdir(self.path("folder"))
         verbs = (["info", "x"], ["check", "x"], ["extract", "x", "-o", "x.ply", "--full"],
-                 ["render", "x", "-o", "x.png"], ["bench", "x", "--path", "orbit", "--frames", "2"])
-        for cut in (0, 1, 40, 128, 500):
-            self.write("x", whole[:cut])
-            for verb in verbs:
-                with self.subTest(verb=verb[0], cut=cut):
-                    run = self.run_pietra(*verb)
-                    self.assertEqual(run.returncode, 3, run.stderr)
-                    self.assertTrue(run.stderr.startswith("pietra: x: "), run.stderr)
+                 ["render", "x", "-o", "x.png"], ["view", "x", "--renderer", "cpu"],
+                 ["bench", "x", "--path", "orbit", "--frames", "2", "--report", "x.json"])
+
+        def refused(verb, x, code, what):
+            with self.subTest(verb=verb[0], x=x):
+                run = self.run_pietra(*(x if word == "x" else word for word in verb))
+                self.assertEqual(run.returncode, code, run.stderr)
+                self.assertEqual(run.stderr, f"pietra: {x}: {what}\n")
+                self.assertEqual([f for f in os.listdir(self.folder) if f.startswith("x.")], [])
+        bad = {"missing": (4, "cannot open: No such file or directory"),
+               "folder": (4, "cannot open: Is a directory"),
+               "/dev/stdin": (3, "is a pipe or device, not a file"),
+               "m.ply": (3, "byte 0: this is no Pietra model")}
+        for cut in (0, 1, 40, 128, 500, 5000):
+            self.write(f"cut{cut}", whole[:cut])
+            bad[f"cut{cut}"] = 3, ("byte 0: this is no Pietra model" if cut < 8 else
+                                   f"byte {cut}: the file ends early, within its header" if cut <= 500
+                                   else f"byte {cut}: the file ends early, {len(whole) - cut} bytes short")
+        self.write("long", whole + b"more")
+        bad["long"] = 3, f"byte {len(whole)}: 4 bytes too many follow the model"
+        for verb in verbs:
+            for x, (code, what) in bad.items():
+                refused(verb, x, code, what)
+        for x in ("missing", "folder"):
+            refused(["compare", "x", "x"], x, *bad[x])
+        self.write("x", whole)
+        run = self.run_pietra("build", "x", "-o", "y.pietra")
+        self.assertEqual((run.returncode, run.stderr), (
+            3, "pietra: x: is of no format that Pietra reads (PLY, STL, glTF, OBJ)\n"))
         middle = len(whole) // 2
         self.write("x", whole[:middle] + bytes(64) + whole[middle + 64:])
         for verb in (verbs[1], verbs[2], verbs[3] + ["--pixels", "0"]):
@@ -224,6 +252,169 @@ class Refusals(CommandLineTest):
                 self.assertEqual(self.run_pietra(*verb).returncode, 3)
         self.assertFalse(os.path.exists(self.path("x.ply")))
         self.assertFalse(os.path.exists(self.path("x.png")))
+
+
+class OddForms(CommandLineTest):
+    """What real programs write: it is read, or refused with its line."""
+
+    def outcome(self, name, data):
+        """The colours of the model made of it, its triangles and the warnings; or the fault."""
+        self.write(name, data)
+        run = self.run_pietra("build", name, "-o", "o.pietra", "--force")
+        warnings = [line.split("warning: ")[1] for line in run.stderr.splitlines() if "warning" in line]
+        if run.returncode != 0:
+            self.assertEqual(run.returncode, 3, run.stderr)
+            return run.stderr.strip().removeprefix(f"pietra: {name}: ")
+        self.run_pietra("extract", "o.pietra", "-o", "o.ply", "--full", "--force")
+        names, vertices, triangles = read_ply(self.read("o.ply"))
+        colours = {v[names.index("red"):][:4] for v in map(tuple, vertices)} if "red" in names else None
+        return len(triangles), colours, warnings
+
+    def expect(self, table):
+        for name, (data, expected) in table.items():
+            with self.subTest(name):
+                result = self.outcome(name, data)
+                self.assertEqual(result if isinstance(expected, str) else result[:len(expected)],
+                                 expected)
+
+    def test_ply(self):
+        v, f = TETRAHEDRON
+        text = mesh_forms.ply(v, f, "ascii")
+
+        def with_colours(kind, names, values):
+            head = "".join(f"property {kind} {n}\n" for n in names.split()).encode()
+            lines = text.replace(b"element face", head + b"element face").split(b"\n")
+            first = lines.index(b"end_header") + 1
+            for i in range(first, first + 4):
+                lines[i] += b" " + values
+            return b"\n".join(lines)
+        rgb = {(255, 128, 0, 255)}
+        self.expect({
+            "uchar.ply": (with_colours("uchar", "red green blue", b"255 128 0"), (4, rgb, [])),
+            "float.ply": (with_colours("float", "red green blue", b"1.0 0.5 0"), (4, rgb, [])),
+            "uint.ply": (with_colours("uint", "red green blue", b"255 128 0"), (4, rgb, [])),
+            "short.ply": (with_colours("ushort", "r g b", b"65535 32896 0"), (4, rgb, [])),
+            "diffuse.ply": (with_colours("uchar", "diffuse_red diffuse_green diffuse_blue",
+                                         b"255 128 0"), (4, rgb, [])),
+            "alpha.ply": (with_colours("uchar", "red green blue alpha", b"255 128 0 9"),
+                          (4, {(255, 128, 0, 9)}, [])),
+            "index.ply": (text.replace(b"list uchar int vertex_indices",
+                                       b"list uint8 int32 vertex_index"), (4, None, [])),
+            "info.ply": (text.replace(b"comment", b"obj_info num_cols 5\nobj_info\ncomment"), (4,)),
+            "mark.ply": (b"\xef\xbb\xbf" + text, (4,)),
+            "cr.ply": (text.replace(b"\n", b"\r"), (4,)),
+            "tabs.ply": (text.replace(b" ", b"\t"), (4,)),
+            "blanks.ply": (text.replace(b"1.0 0.0 0.0\n", b" 1e+0  +.0 -0E5  \n\n") + b"\n \n", (4,)),
+            "comma.ply": (text.replace(b"1.0 0.0 0.0", b"1,0 0,0 0,0"),
+                          'line 12: "1,0" is no number (property x of element vertex)'),
+            "hex.ply": (text.replace(b"1.0 0.0 0.0", b"0x1 0 0"),
+                        'line 12: "0x1" is no number (property x of element vertex)'),
+            "nan.ply": (text.replace(b"1.0 0.0 0.0", b"nan(ind) 0 0"),
+                        "line 12: vertex 1 is at (nan, 0, 0), which is no point"),
+            "qnan.ply": (text.replace(b"1.0 0.0 0.0", b"1.#QNAN 0 0"),
+                         'line 12: "1.#QNAN" is no number (property x of element vertex)'),
+            "texture.ply": (with_colours("float", "s t", b"0 1"),
+                            (4, None, ["texture coordinates are left out"])),
+        })
+
+    def test_obj(self):
+        v, f = TETRAHEDRON
+        text = mesh_forms.obj(v, f)
+        orange = b"".join(b"v %g %g %g 1 0.5 0\n" % p for p in v)
+        faces = text[text.index(b"f"):]
+        rgb = {(255, 128, 0, 255)}
+        self.expect({
+            "rgb.obj": (orange + faces, (4, rgb, [])),
+            "rgb255.obj": (orange.replace(b"1 0.5 0\n", b"255 128 0\n") + faces, (4, rgb, [])),
+            "some.obj": (text.replace(b"v 0.0 0.0 0.0", b"v 0 0 0 1 0 0"),
+                         (4, {(255, 0, 0, 255), (255, 255, 255, 255)}, [])),
+            "joined.obj": (text.replace(b"f 1 3 2", b"f 1 \\\n 3 \\\r\n2"), (4, None, [])),
+            "blanks.obj": (text.replace(b" ", b" \t ").replace(b"\n", b"  # why\n"), (4, None, [])),
+            "cr.obj": (text.replace(b"\n", b"\r"), (4, None, [])),
+            "mark.obj": (b"\xef\xbb\xbf" + text.rstrip(b"\n"), (4, None, [])),
+            "groups.obj": (b"o W\xfcrfel\ng a b\ns off\n" + text, (4, None, [])),
+            "materials.obj": (b"mtllib a b.mtl\nusemtl c\n" + text, (4, None, ["materials are left out"])),
+            "paint.obj": (text + b"#MRGB ffff0000ff00ff00ff0000ffffffffff\n",
+                          (4, None, ["the colours in comments (#MRGB) are left out"])),
+            "numbers.obj": (text.replace(b"v 1.0 0.0 0.0", b"v +1. 1e-300 0E+5"), (4, None, [])),
+            "padded.obj": (text + bytes(9), (4, None, [])),
+            "others.obj": (text + b"vp 0.5\np 1\nl 1 2\ncall x.obj\n", (4, None, [
+                "1 lines and 1 statements of points are left out",
+                "free-form curves and surfaces are left out",
+                '1 statements of no known kind are left out ("call" on line 12)'])),
+            "comma.obj": (text.replace(b"v 1.0", b"v 1,0"), 'line 2: "1,0" is no number (x of a vertex)'),
+            "hex.obj": (text.replace(b"v 1.0", b"v 0x1"), 'line 2: "0x1" is no number (x of a vertex)'),
+            "page.obj": (b"<!DOCTYPE html><html>404</html>",
+                         'line 1: "<!DOCTYPE" begins no statement of an OBJ file'),
+            "wide.obj": (text.decode().encode("utf-16"),
+                         'line 1: "??v?" begins no statement of an OBJ file'),
+        })
+
+    def test_stl(self):
+        v, f = TETRAHEDRON
+        binary, text = mesh_forms.stl(v, f), mesh_forms.stl(v, f, text=True)
+        paint = binary[:84] + b"".join(binary[i:i + 48] + b"\x1f\x80" for i in range(84, 284, 50))
+        self.expect({
+            "solid.stl": (b"solid" + binary[5:], (4, None, [])),
+            "nameless": (binary, (4, None, [])),
+            "paint.stl": (paint, (4, None, ["the 16-bit attributes of 4 facets (colours, in some "
+                                            "programs) are left out"])),
+            "padded.stl": (binary + b"more", (4, None, ["4 bytes after the last triangle are left out"])),
+            "upper.stl": (text.upper(), (4, None, [])),
+            "cr.stl": (text.replace(b"\n", b"\r"), (4, None, [])),
+            "normals.stl": (text.replace(b"normal 0 0 0", b"normal nan 1.#IND -nan(ind)"), (4, None, [])),
+            "none.stl": (b"solid x\nendsolid x\n", "has no triangles: nothing to show"),
+            "open.stl": (text.replace(b"endsolid thing\n", b""),
+                         "line 30: the file ends within a solid, after 4 triangles"),
+            "comma.stl": (text.replace(b"vertex 1.0", b"vertex 1,0"),
+                          'line 6: "1,0" stands where a number is expected'),
+        })
+
+    def test_glb(self):
+        v, f = TETRAHEDRON
+
+        def glb(**scene):
+            return mesh_forms.glb(v, f, change=lambda s: s.update(scene))
+        rgb, half = {(255, 128, 0, 255)}, {(255, 128, 0, 128)}
+        cases = {f"{kind}-{component}.glb": (mesh_forms.glb(v, f, change=mesh_forms.coloured(
+            kind, component, pack, values)), (4, expected, [])) for kind, component, pack, values, expected in (
+                ("VEC3", 5126, "<3f", (1, 0.5, 0), rgb), ("VEC4", 5126, "<4f", (1, 0.5, 0, 0.5), half),
+                ("VEC3", 5121, "<3B", (255, 128, 0), rgb), ("VEC4", 5121, "<4B", (255, 128, 0, 128), half),
+                ("VEC3", 5123, "<3H", (65535, 32896, 0), rgb),
+                ("VEC4", 5123, "<4H", (65535, 32896, 0, 32896), half))}
+        cases["nested.glb"] = glb(nodes=[{"children": [1], "scale": [-1, 1, 1]},
+                                         {"mesh": 0, "translation": [5, 0, 0]}]), (4, None, [])
+        cases["sceneless.glb"] = mesh_forms.glb(v, f, change=lambda s: s.pop("scenes") and None), (4,)
+        cases["packed.glb.gz"] = gzip.compress(glb()), (4, None, [])
+        cases["circle.glb"] = (glb(nodes=[{"mesh": 0, "children": [0]}]),
+                               "nodes[0].children: node 0 has another parent, or is below itself")
+        for name in ("KHR_draco_mesh_compression", "EXT_meshopt_compression"):
+            cases[name + ".glb"] = (
+                glb(extensionsRequired=[name]), f"extensionsRequired: Pietra does not know the extension "
+                f"{name}, without which the file cannot be read")
+        cases["quantised.glb"] = glb(extensionsRequired=["KHR_mesh_quantization"]), (4,)
+        self.expect(cases)
+
+
+class Pipes(CommandLineTest):
+    def test_every_form_through_a_pipe(self):
+        v, f = TETRAHEDRON
+        for data in (mesh_forms.ply(v, f), mesh_forms.ply(v, f, "ascii"), mesh_forms.obj(v, f),
+                     mesh_forms.stl(v, f), mesh_forms.stl(v, f, text=True), mesh_forms.glb(v, f),
+                     gzip.compress(mesh_forms.ply(v, f))):
+            run = subprocess.run([command_line_test.PIETRA, "build", "/dev/stdin", "-o", "m.pietra",
+                                  "--force"], input=data, cwd=self.folder, capture_output=True, timeout=60)
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertIn(b": 4 triangles", run.stderr)
+            self.assertEqual(os.listdir(self.folder), ["m.pietra"])
+
+    def test_a_bad_mesh_through_a_pipe(self):
+        run = subprocess.run([command_line_test.PIETRA, "build", "/dev/stdin", "-o", "m.pietra"],
+                             input=b"v 0 0\n", cwd=self.folder, capture_output=True, timeout=60)
+        self.assertEqual((run.returncode, run.stderr.decode()),
+                         (3, "pietra: /dev/stdin: has vertices but no faces: a cloud of points is nothing to "
+                             "show\n"))
+        self.assertEqual(os.listdir(self.folder), [])
 
 
 if __name__ == "__main__":

@@ -56,7 +56,8 @@ def stl(vertices, faces, text=False):
     return data
 
 
-def glb(vertices, faces, index="H"):
+def glb(vertices, faces, index="H", change=None):
+    """`change`: what a test does to the JSON; bytes that it returns go behind the others."""
     positions = b"".join(struct.pack("<3f", *v) for v in vertices)
     indices = b"".join(struct.pack("<3" + index, *f) for f in faces)
     indices += bytes(-len(indices) % 4)
@@ -72,9 +73,25 @@ def glb(vertices, faces, index="H"):
                        "type": "VEC3", "min": low, "max": high},
                       {"bufferView": 1, "componentType": {"H": 5123, "I": 5125}[index],
                        "count": 3 * len(faces), "type": "SCALAR"}]}
+    body = positions + indices
+    if change:
+        body += change(scene) or b""
+    scene["buffers"][0]["byteLength"] = len(body)
     text = json.dumps(scene).encode()
     text += b" " * (-len(text) % 4)
-    body = positions + indices
     return (struct.pack("<III", 0x46546C67, 2, 28 + len(text) + len(body)) +
             struct.pack("<II", len(text), 0x4E4F534A) + text +
             struct.pack("<II", len(body), 0x004E4942) + body)
+
+
+def coloured(kind, component, pack, values):
+    """A change for glb(): every vertex of four has the COLOR_0 `values`."""
+    def change(scene):
+        data = b"".join(struct.pack(pack, *values) for _ in range(4))
+        scene["bufferViews"].append({"buffer": 0, "byteOffset": scene["buffers"][0]["byteLength"],
+                                     "byteLength": len(data)})
+        scene["accessors"].append({"bufferView": 2, "componentType": component, "count": 4,
+                                   "type": kind, "normalized": component != 5126})
+        scene["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 2
+        return data + bytes(-len(data) % 4)
+    return change

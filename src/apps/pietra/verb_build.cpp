@@ -92,8 +92,9 @@ VerbText BuildVerb::text() const {
          "goes "
          "to temporary files, some 60 to 100 bytes a triangle. The output appears under its name "
          "only when it is complete.",
-         "Formats are told by content: PLY (also gzipped), OBJ, STL, glTF and GLB as far as this "
-         "program's version reads them. Normals, colours and scalar attributes are kept.",
+         "Formats are told by content: PLY, OBJ, STL, glTF and GLB, packed by gzip, xz or zstd "
+         "too. A pipe (/dev/stdin) is copied to a temporary file first. Normals, colours and "
+         "scalar attributes are kept.",
          "The bytes of the model depend on the bytes of the input, the method, the precision and "
          "the patch sizes alone: not on memory, threads or names."},
         {{"a model of a scan", "pietra build statue.ply -o statue.pietra"},
