@@ -53,7 +53,7 @@ public:
 protected:
     explicit TextWindow(ByteReader& reader) : reader_(reader) {}
 
-    /// The text at the cursor, whether it was reached by this class or by the reader itself.
+    /// Makes sure that a whole word lies at p_, which may move.
     void need() {
         if (p_ > limit_) [[unlikely]]
             refill();
