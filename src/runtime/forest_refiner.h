@@ -65,7 +65,11 @@ private:
 
     const Residency& residency_;
     const Forest& forest_;
-    std::vector<NodeIndex> stack_;
+    struct Visited {
+        NodeIndex node;
+        bool covered;  // a node above it is drawn, as its group is not open
+    };
+    std::vector<Visited> stack_;
     std::vector<Missing> missing_;
     std::vector<uint32_t> group_used_, page_used_;            // by which select() last
     std::vector<uint32_t> group_requested_, page_requested_;  // in which round last
@@ -73,29 +77,28 @@ private:
 };
 
 /// Top-down over what may be visible: draw(node, pixels of error), refined(group) for those that
-/// are refined; those that should be go to `missing_`.
+/// are refined. Those that should be go to `missing_`, and likewise what should be below them, so
+/// that all levels that are missing are asked for at once.
 template <class Draw, class Refined>
 void ForestRefiner::visit(const View& view, double pixels, const Culling& culling, const Draw& draw,
                           const Refined& refined) {
     missing_.clear();
-    stack_ = forest_.roots();
+    stack_.clear();
+    for (const NodeIndex root : forest_.roots()) stack_.push_back({root, false});
     while (!stack_.empty()) {
-        const NodeIndex i = stack_.back();
+        const auto [i, covered] = stack_.back();
         stack_.pop_back();
         const Node& node = forest_.node(i);
         if (branchInvisible(node, view, pixels, culling)) continue;
         const double error = view.errorInPixels(node.error, node.saturated);
-        if (!node.isLeaf() && !(error <= pixels)) {
-            const uint32_t group = forest_.groupOf(i);
-            if (residency_.open(group)) {
-                refined(group);
-                for (const NodeIndex child : node.child)
-                    if (child != kNoNode) stack_.push_back(child);
-                continue;
-            }
-            missing_.push_back({group, float(error)});
-        }
-        if (!patchInvisible(node, view, pixels, culling)) draw(i, error);
+        const bool refine = !node.isLeaf() && !(error <= pixels);
+        const bool open = refine && residency_.open(forest_.groupOf(i));
+        if (open) refined(forest_.groupOf(i));
+        if (refine && !open) missing_.push_back({forest_.groupOf(i), float(error)});
+        if (!open && !covered && !patchInvisible(node, view, pixels, culling)) draw(i, error);
+        if (!refine) continue;
+        for (const NodeIndex child : node.child)
+            if (child != kNoNode) stack_.push_back({child, !open});
     }
 }
 

@@ -42,15 +42,21 @@ Pairs groupPagePairs(const Forest& forest, bool from_page) {
 
 }  // namespace
 
-Adjacency::Adjacency(uint32_t lists, Pairs pairs) {
-    std::sort(pairs.begin(), pairs.end());
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-    begin_.assign(size_t(lists) + 1, 0);
-    for (const auto& [list, item] : pairs) {
-        ++begin_[list + 1];
-        item_.push_back(item);
+Adjacency::Adjacency(uint32_t lists, const Pairs& pairs) : item_(pairs.size()) {
+    std::vector<uint32_t> end(size_t(lists) + 1, 0);
+    for (const auto& [list, item] : pairs) ++end[list + 1];
+    for (size_t i = 1; i < end.size(); ++i) end[i] += end[i - 1];
+    begin_ = end;
+    for (const auto& [list, item] : pairs) item_[end[list]++] = item;
+    auto out = item_.begin();
+    for (uint32_t list = 0; list < lists; ++list) {
+        const auto first = item_.begin() + begin_[list], last = item_.begin() + end[list];
+        std::sort(first, last);
+        begin_[list] = uint32_t(out - item_.begin());
+        out = std::copy(first, std::unique(first, last), out);
     }
-    for (size_t i = 1; i < begin_.size(); ++i) begin_[i] += begin_[i - 1];
+    begin_[lists] = uint32_t(out - item_.begin());
+    item_.erase(out, item_.end());
 }
 
 Residency::Residency(const Forest& forest, uint32_t page_count)

@@ -24,7 +24,7 @@ using PageIndex = uint32_t;
 class Adjacency {
 public:
     /// `pairs`: (of which list, what); each list in increasing order, doubles dropped.
-    Adjacency(uint32_t lists, std::vector<std::pair<uint32_t, uint32_t>> pairs);
+    Adjacency(uint32_t lists, const std::vector<std::pair<uint32_t, uint32_t>>& pairs);
     std::span<const uint32_t> of(uint32_t list) const {
         return {item_.data() + begin_[list], size_t(begin_[list + 1] - begin_[list])};
     }

@@ -23,12 +23,13 @@ struct SceneModel {
         return hasCopy(node.page) ? &copies[node.page][node.patch] : nullptr;
     }
     bool hasCopy(PageIndex page) const { return !copies[page].empty(); }
-    /// It cannot be read, or depends on a page that cannot.
-    bool hopeless(PageIndex page) const {
-        if (bad[page] != 0) return true;
-        if (residency.resident(page)) return false;
+    /// It cannot be read, or depends on a page that cannot. To be asked of those above it first.
+    bool hopeless(PageIndex page) {
         const std::span<const PageIndex> above = residency.pagesAbove(page);
-        return std::any_of(above.begin(), above.end(), [&](PageIndex p) { return hopeless(p); });
+        if (std::any_of(above.begin(), above.end(),
+                        [&](PageIndex p) { return bad[p] != 0 && !residency.resident(p); }))
+            bad[page] = 1;
+        return bad[page] != 0;
     }
 
     const ModelReader& reader;
@@ -46,7 +47,7 @@ struct SceneModel {
     std::vector<uint32_t> eye_used;         ///< ... told where the eye is
     std::vector<uint32_t> last_wanted;      ///< ... was missing
     std::vector<uint8_t> arriving;          ///< has a copy, and waits to be resident
-    std::vector<uint8_t> bad;               ///< cannot be read
+    std::vector<uint8_t> bad;               ///< will never be there
 };
 
 }  // namespace pietra
