@@ -322,7 +322,7 @@ class Shown(VerbTest):
                "--camera and --view exclude each other: give one")
 
     def test_bench_on_every_path(self):
-        for path in ("orbit", "dive", "flight", "jumps"):
+        for path in ("orbit", "dive", "flight", "jumps", "inspection"):
             r = self.report("bench", "statue.pietra", "--path", path, "--frames", "12", "--size",
                             "160x120", "--report", "-")
             self.assertEqual(len(r["frames"]), 12)
@@ -330,6 +330,16 @@ class Shown(VerbTest):
             self.assertGreater(r["summary"]["first_image_ms"], 0)
             self.assertGreaterEqual(r["summary"]["converged_ms"], 0)
             self.assertGreater(max(f["triangles"] for f in r["frames"]), 0)
+            self.assertGreater(r["summary"]["overhead_ratio"], 0.5)
+            self.assertGreater(min(f["static_ms"] for f in r["frames"]), 0)
+            self.assertNotIn("cold_overhead_ratio", r["summary"])
+            self.assertGreater(r["summary"]["largest_process_bytes"],
+                               r["summary"]["rss_before_bytes"])
+            self.write("path.json", json.dumps(r["path"]))
+            again = self.report("bench", "statue.pietra", "--path", "path.json", "--frames", "12",
+                                "--size", "160x120", "--renderer", "none", "--report", "-")
+            self.assertEqual(again["path"], r["path"])
+            self.assertNotIn("overhead_ratio", again["summary"])
         undrawn = self.report("bench", "statue.pietra", "--path", "orbit", "--frames", "5",
                               "--renderer", "none", "--prefetch", "off", "--report", "-")
         self.assertEqual(undrawn["frames"][0]["draw_ms"], 0)
@@ -353,7 +363,7 @@ class Shown(VerbTest):
         r = json.loads(run.stdout)
         self.assertEqual(r["renderer"], "gl")
         for frame in r["frames"]:
-            self.assertTrue(0 < frame["resident_bytes"]["vram"] <= 2 << 20, frame)
+            self.assertTrue(0 < frame["device_bytes"] <= 2 << 20, frame)
             self.assertGreater(frame["gpu_ms"], 0)
         self.assertGreater(r["summary"]["overhead_ratio"], 0)
         self.assertRefused(fly + ["--vram", "1K"], 5, "--ram 1.0 GiB, --vram 1.0 KiB: OpenGL needs "
@@ -380,6 +390,25 @@ class Shown(VerbTest):
         run = self.run_pietra(*look, "--renderer", "gl", env=none)
         self.assertEqual(run.returncode, 2)
         self.assertTrue(run.stderr.startswith("pietra: --renderer gl: "), run.stderr)
+    def test_bench_writes_a_page(self):
+        html = os.path.join(self.folder, "r.html")
+        whole = {"target": [0, 0, 0], "up": [0, 0, 1], "fovy_deg": 45}
+        self.write("short.json", json.dumps({"seconds": 0.2, "keys": [
+            {"t": 0, "eye": [9, 0, 0], **whole}, {"t": 0.2, "eye": [9, 1, 0], **whole}]}))
+        r = self.report("bench", "statue.pietra", "--path", "short.json", "--frames", "9", "--size",
+                        "160x120", "--cold", "--html", html, "--report", "-")
+        self.assertGreater(r["summary"]["cold_overhead_ratio"], 0)
+        for flight in ("without_prefetch", "without_drawing"):
+            self.assertEqual(len(r[flight]["frames"]), 9)
+        self.assertEqual(max(f["draw_ms"] for f in r["without_drawing"]["frames"]), 0)
+        with open(html, encoding="utf-8") as file:
+            page = file.read()
+        self.assertEqual(page.count("<svg"), page.count("</svg>"))
+        self.assertGreater(page.count("<svg"), 5)
+        for absent in ("<script", "http", "src=", "nan"):
+            self.assertNotIn(absent, page)
+        self.assertRefused(["bench", "statue.pietra", "--path", "orbit", "--html", html], 2,
+                           f"{html}: exists; --force overwrites it")
 
     def test_view_does_as_a_script_says(self):
         self.write("s.txt", "# turn it\nwait\nscreenshot a.png\ndrag left 200 150 300 180\n"

@@ -1,11 +1,19 @@
 #include "apps/pietra/flight.h"
 
+#include <time.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <deque>
+#include <fstream>
 #include <memory>
+#include <sstream>
 #include <thread>
 
+#include "apps/pietra/static_list.h"
+#include "base/budget.h"
 #include "base/check.h"
 #include "render/live/gl_live.h"
 #include "runtime/patch_reader.h"
@@ -14,8 +22,6 @@ namespace pietra {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-const Clock::time_point kStart = Clock::now();
 
 constexpr int kSampledFrames = 24;
 constexpr int kRepeats = 3;
@@ -40,11 +46,13 @@ public:
         for (int i = 0; i < settings_.frames; ++i) {
             if (settings_.real_time) waitFor(start, timeOf(i));
             record_.frames.push_back(frame(request(i)));
+            record_.frames.back().seconds = timeOf(i);
+            record_.frames.back().process_bytes = residentBytes();
             progress(i);
         }
         record_.seconds = msSince(start) / 1e3;
         awaitConvergence();
-        if (renderer_) compareWithStaticDraws();
+        if (settings_.compare) compareWithStaticDraws(progress);
         record_.faults = scene_.faults();
         return std::move(record_);
     }
@@ -96,7 +104,7 @@ private:
         record.select_ms = frame.select_ms;
         record.load_ms = frame.publish_ms;
         if (renderer_) {
-            record.draw_ms = draw(frame);
+            record.draw_ms = draw(frame, patchesOf(frame));
             record.gpu_ms = renderer_->gpuMs();
         }
         record.ms = msSince(start);
@@ -113,12 +121,19 @@ private:
         return record;
     }
 
-    double draw(const Frame& frame) {
+    using Lists = std::vector<std::span<const DrawPatch>>;
+
+    static Lists patchesOf(const Frame& frame) {
+        Lists lists;
+        for (const ModelFrame& model : frame.models) lists.emplace_back(model.patches);
+        return lists;
+    }
+
+    double draw(const Frame& frame, const Lists& lists) {
         const auto start = Clock::now();
         std::vector<ModelPatches> list;
         for (size_t m = 0; m < frame.models.size(); ++m)
-            list.push_back(
-                {frame.models[m].view, &models_[m]->info().lattice, frame.models[m].patches});
+            list.push_back({frame.models[m].view, &models_[m]->info().lattice, lists[m]});
         renderer_->draw(list, {{}, settings_.samples, settings_.culling.occlusion});
         renderer_->wait();
         return msSince(start);
@@ -136,27 +151,41 @@ private:
         }
     }
 
-    void compareWithStaticDraws() {
-        std::vector<double> ratios, static_ms;
+    void compareWithStaticDraws(const std::function<void(int)>& progress) {
+        std::vector<double> ratios;
         const int step = std::max(1, settings_.frames / kSampledFrames);
-        for (int i = 0; i < settings_.frames; i += step) {
-            FrameRequest sampled = request(i);
-            sampled.prefetch = false;
-            const Frame& resident = scene_.converge(sampled);
-            std::vector<double> whole, still;
-            for (int repeat = 0; repeat < kRepeats; ++repeat) {
-                still.push_back(draw(resident));
-                whole.push_back(frame(sampled).ms);
-            }
-            ratios.push_back(percentile(whole, 0.5) / percentile(still, 0.5));
-            static_ms.push_back(percentile(still, 0.5));
+        for (int i = 0; i < settings_.frames; ++i) {
+            FrameRequest view = request(i);
+            view.prefetch = false;
+            const Frame& resident = scene_.converge(view);
+            record_.frames[i].static_ms = draw(resident, patchesOf(resident));
+            if (i % step == 0) ratios.push_back(overhead(view, resident));
+            progress(i);
         }
         record_.overhead_ratio = percentile(ratios, 0.5);
-        std::vector<double> stalls;
-        for (size_t i = 0; i < record_.frames.size(); ++i)
-            stalls.push_back(record_.frames[i].ms /
-                             static_ms[std::min(i / size_t(step), static_ms.size() - 1)]);
-        record_.stall_p99 = percentile(stalls, 0.99);
+    }
+
+    /// Of the whole frame over the faster of two ways to draw it as a static thing: as one buffer,
+    /// and as the patches it consists of, which suit the CPU renderer better.
+    double overhead(const FrameRequest& view, const Frame& resident) {
+        std::deque<StaticList> buffers;
+        Lists merged;
+        for (uint32_t m = 0; m < models_.size(); ++m) {
+            buffers.emplace_back(*models_[m], resident.models[m].patches, PageKey{~m, 0},
+                                 renderer_->sink());
+            merged.push_back(buffers.back().patches());
+        }
+        const bool drawable = std::all_of(buffers.begin(), buffers.end(),
+                                          [](const StaticList& list) { return list.drawable(); });
+        std::vector<double> whole, still[2];
+        for (int repeat = 0; repeat < kRepeats; ++repeat) {
+            if (drawable) still[0].push_back(draw(resident, merged));
+            still[1].push_back(draw(resident, patchesOf(resident)));
+            whole.push_back(frame(view).ms);
+        }
+        const double list_ms = percentile(still[1], 0.5);
+        return percentile(whole, 0.5) /
+               (drawable ? std::min(list_ms, percentile(still[0], 0.5)) : list_ms);
     }
 
     std::vector<const ModelReader*> models_;
@@ -171,7 +200,18 @@ private:
 }  // namespace
 
 double msSinceStart() {
-    return msSince(kStart);
+    std::ifstream file("/proc/self/stat");
+    std::string text;
+    std::getline(file, text);
+    // The 22nd field; the second, a name in brackets, may hold anything.
+    std::istringstream fields(text.substr(text.rfind(')') + 1));
+    for (int field = 3; field < 22; ++field) fields >> text;
+    double ticks = 0;
+    fields >> ticks;
+    timespec now{};
+    ::clock_gettime(CLOCK_BOOTTIME, &now);
+    return double(now.tv_sec) * 1e3 + double(now.tv_nsec) * 1e-6 -
+           ticks * 1e3 / double(::sysconf(_SC_CLK_TCK));
 }
 
 FlightRecord fly(const std::vector<const ModelReader*>& models, const CameraPath& path,

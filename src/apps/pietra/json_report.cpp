@@ -39,9 +39,11 @@ void checkOutput(const std::string& path, bool force) {
 }
 
 void writeReport(const std::string& path, const nlohmann::ordered_json& report, bool force) {
-    if (path.empty()) return;
-    if (path == "-") return printJson(report);
-    const std::string text = jsonText(report);
+    if (!path.empty()) writeText(path, jsonText(report), force);
+}
+
+void writeText(const std::string& path, std::string_view text, bool force) {
+    if (path == "-") return printOut(text);
     AtomicFile file(path, force);
     file.file().write(text.data(), text.size());
     file.commit();

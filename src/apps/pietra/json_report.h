@@ -15,7 +15,10 @@ void checkOutput(const std::string& path, bool force);
 /// Indented JSON with a newline; atomic. "-" is standard output; an empty path writes nothing.
 void writeReport(const std::string& path, const nlohmann::ordered_json& report, bool force);
 
-/// The same to standard output.
+/// Any other text, likewise.
+void writeText(const std::string& path, std::string_view text, bool force);
+
+/// JSON to standard output.
 void printJson(const nlohmann::ordered_json& json);
 
 /// Writes to standard output and flushes it; throws IoError.

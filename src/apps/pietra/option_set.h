@@ -71,8 +71,10 @@ public:
     }
     template <class T>
     Option& size(const char* names, T& target, const char* help) {
-        return add(names, "SIZE", help, target,
-                   [](const std::string& text) { return parseSize(text); });
+        Option& option = add(names, "SIZE", help, target,
+                             [](const std::string& text) { return parseSize(text); });
+        if (const std::optional<uint64_t> bytes = target) option.standard = formatSize(*bytes);
+        return option;
     }
     template <class T>
     Option& pictureSize(const char* names, T& target, const char* help) {

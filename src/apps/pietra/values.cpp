@@ -71,6 +71,13 @@ uint64_t parseSize(std::string_view text) {
     return *bytes;
 }
 
+std::string formatSize(uint64_t bytes) {
+    constexpr std::string_view kUnits = "kMGT";
+    size_t units = 0;
+    for (; units < kUnits.size() && bytes > 0 && bytes % 1024 == 0; ++units) bytes /= 1024;
+    return fmt::format("{}{}", bytes, units > 0 ? kUnits.substr(units - 1, 1) : "");
+}
+
 PictureSize parsePictureSize(std::string_view text) {
     const size_t cross = text.find('x');
     PictureSize size;

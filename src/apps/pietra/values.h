@@ -32,6 +32,8 @@ uint64_t parseCount(std::string_view text, const CountRange& range = {});
 
 /// Bytes, binary multiples allowed: "1000000", "512M", "1.5G".
 uint64_t parseSize(std::string_view text);
+/// The shortest text that parseSize() reads as so many bytes: "1G".
+std::string formatSize(uint64_t bytes);
 
 /// "1280x1024": width and height in pixels, each of 1 to kMaxPictureSide.
 PictureSize parsePictureSize(std::string_view text);

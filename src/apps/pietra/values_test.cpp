@@ -63,5 +63,10 @@ TEST(Values, pictureSizes) {
                   "'" + std::string(wrong) + "': width and height must be from 1 to 16384");
 }
 
+TEST(Values, sizesAreShownAsTheyAreRead) {
+    for (const char* text : {"0", "1", "1000", "1k", "1536k", "512M", "1G", "1025M", "3T", "2048T"})
+        EXPECT_EQ(formatSize(parseSize(text)), text);
+}
+
 }  // namespace
 }  // namespace pietra

@@ -1,16 +1,15 @@
 // pietra bench: a camera path flown through models, and measured.
 
-#include <fcntl.h>
 #include <fmt/format.h>
 
 #include <cmath>
-#include <mutex>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "apps/pietra/camera_json.h"
 #include "apps/pietra/draw_options.h"
-#include "apps/pietra/flight.h"
+#include "apps/pietra/flight_report.h"
 #include "apps/pietra/json_report.h"
 #include "apps/pietra/limits.h"
 #include "apps/pietra/logging.h"
@@ -20,8 +19,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/text.h"
-#include "extmem/file.h"
-#include "runtime/patch_reader.h"
+#include "extmem/page_cache.h"
 #include "runtime/standard_paths.h"
 
 namespace pietra {
@@ -41,7 +39,11 @@ public:
 private:
     CameraPath path(const ModelFiles& files) const;
     FlightSettings settings(const CameraPath& path) const;
-    Json report(const FlightRecord& record) const;
+    void dropCaches() const;
+    FlightRecord flyOnce(const ModelFiles& files, const CameraPath& path,
+                         const FlightSettings& settings, const char* stage,
+                         Progress& progress) const;
+    Json report(const BenchRecord& record, const CameraPath& path) const;
 
     std::vector<std::string> files_;
     std::string path_;
@@ -55,6 +57,7 @@ private:
     std::string prefetch_ = "on";
     uint64_t ram_ = uint64_t(1) << 30, vram_ = uint64_t(1) << 30;
     bool cold_ = false;
+    std::string html_;
     std::optional<uint64_t> jobs_;
 };
 
@@ -71,19 +74,24 @@ VerbText BenchVerb::text() const {
          "holes, and the tolerance that each frame keeps to is in the report."},
         {{"an orbit around the model", "pietra bench moon.pietra --path orbit"},
          {"a recorded flight, as a user sees it after a reboot",
-          "pietra bench moon.pietra --path flight.json --cold --report r.json"}},
+          "pietra bench moon.pietra --path flight.json --cold --report r.json"},
+         {"what Adaptive TetraPuzzles were measured by, with a page of graphs",
+          "pietra bench moon.pietra --path inspection --size 800x600 --pixels 2 --samples 4 --cold "
+          "--html r.html"}},
         "Paths that every model has",
         {{"orbit", "around the whole, from above and below"},
          {"dive", "from the whole to close above its surface"},
          {"flight", "low over it, along its longer side"},
-         {"jumps", "views from all around and near, each for a second"}}};
+         {"jumps", "views from all around and near, each for a second"},
+         {"inspection",
+          "turns, and rapid changes from the whole to extreme close-ups, 45 seconds"}}};
 }
 
 void BenchVerb::declare(OptionSet& options) {
     options.files("FILE", files_, "The models.").require();
     options
         .text("--path", "PATH", path_,
-              "A camera path: orbit, dive, flight, jumps, or a file: {\"seconds\":20, "
+              "A camera path: orbit, dive, flight, jumps, inspection, or a file: {\"seconds\":20, "
               "\"keys\":[{\"t\":0, \"eye\":[x,y,z], \"target\":[x,y,z], \"up\":[x,y,z], "
               "\"fovy_deg\":45}, ...]}.")
         .require();
@@ -100,36 +108,18 @@ void BenchVerb::declare(OptionSet& options) {
     options.size("--ram", ram_, "Most memory for what is loaded.");
     declareVram(options, vram_);
     options.flag("--cold", cold_, "Drop the system's cache of the files, and fly in real time.");
+    options.text("--html", "R.html", html_,
+                 "Write a page with graphs, too; for it the path is flown again without drawing "
+                 "and without prefetching.");
     options.count("-j,--jobs", "N", jobs_, {.min = 1, .max = 1024}, "Threads to work with.")
         .defaultsTo("all cores");
-}
-
-/// Has effect on pages that nobody else uses.
-void dropSystemCache(const std::string& path) {
-    const File file(path, File::Mode::kRead);
-    ::posix_fadvise(file.descriptor(), 0, 0, POSIX_FADV_DONTNEED);
-}
-
-/// Vertices of the coarsest cuts.
-std::vector<Vec3d> coarsePoints(const ModelFiles& files) {
-    std::vector<Vec3d> points;
-    std::mutex mutex;
-    for (const auto& model : files.models)
-        visitPatches(*model, rootCut(model->nodes()).nodes, [&](NodeIndex, const Mesh& mesh) {
-            const std::lock_guard lock(mutex);
-            for (const Vec3i& p : mesh.position) points.push_back(model->info().lattice.toInput(p));
-        });
-    // Patches come in any order.
-    std::sort(points.begin(), points.end(), [](const Vec3d& a, const Vec3d& b) {
-        return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
-    });
-    return points;
 }
 
 CameraPath BenchVerb::path(const ModelFiles& files) const {
     const bool y = up_ == "y";
     if (const auto known = parseStandardPath(path_))
-        return standardPath(*known, coarsePoints(files), y ? UpAxis::kY : UpAxis::kZ, size_);
+        return standardPath(*known, coarseSurface(files.views()), y ? UpAxis::kY : UpAxis::kZ,
+                            size_);
     return readCameraPath(path_, y ? Vec3d(0, 1, 0) : Vec3d(0, 0, 1));
 }
 
@@ -147,96 +137,108 @@ FlightSettings BenchVerb::settings(const CameraPath& path) const {
                     : renderer_ == "cpu" ? Draw::kCpu
                                          : Draw::kNothing;
     settings.vram_bytes = size_t(vram_);
+    settings.compare = settings.draw != Draw::kNothing;
     settings.real_time = cold_;
     settings.scene.ram_bytes = size_t(ram_);
     return settings;
 }
 
-/// JSON has no infinity: null.
-Json finite(double value) {
-    return std::isfinite(value) ? Json(value) : Json();
+/// What the system calls the processor, and how many threads it has for us.
+std::string machine() {
+    std::ifstream file("/proc/cpuinfo");
+    std::string name = "processor";
+    for (std::string line; std::getline(file, line);)
+        if (line.starts_with("model name")) {
+            name = line.substr(std::min(line.size(), line.find(':') + 2));
+            break;
+        }
+    return fmt::format("{}, {} threads", name, Limits{}.threads());
 }
 
-Json BenchVerb::report(const FlightRecord& record) const {
-    Json frames = Json::array();
-    std::vector<double> ms, gpu_ms;
-    double triangles = 0;
-    uint64_t bytes_read = 0;
-    for (const FrameRecord& f : record.frames) {
-        frames.push_back({{"ms", f.ms},
-                          {"select_ms", f.select_ms},
-                          {"load_ms", f.load_ms},
-                          {"draw_ms", f.draw_ms},
-                          {"triangles", f.triangles},
-                          {"patches", f.patches},
-                          {"operations", 0},
-                          {"bytes_read", f.bytes_read},
-                          {"gpu_ms", f.gpu_ms},
-                          {"resident_bytes", {{"ram", f.resident_bytes}, {"vram", f.device_bytes}}},
-                          {"tolerance_px", finite(f.tolerance_px)},
-                          {"converged", f.converged}});
-        triangles += double(f.triangles);
-        bytes_read += f.bytes_read;
-        ms.push_back(f.ms);
-        gpu_ms.push_back(f.gpu_ms);
-    }
-    double busy_ms = 0;
-    for (const double m : ms) busy_ms += m;
-    Json summary{{"frames", record.frames.size()},
-                 {"ms",
-                  {{"median", percentile(ms, 0.5)},
-                   {"p95", percentile(ms, 0.95)},
-                   {"p99", percentile(ms, 0.99)},
-                   {"max", percentile(ms, 1)}}},
-                 {"gpu_ms", {{"median", percentile(gpu_ms, 0.5)}, {"max", percentile(gpu_ms, 1)}}},
-                 {"seconds", record.seconds},
-                 {"triangles_per_second", 1e3 * triangles / busy_ms},
-                 {"operations_per_second", 0},
-                 {"overhead_ratio", record.overhead_ratio},
-                 {"stall_p99", record.stall_p99},
-                 {"peak_rss_bytes", peakResidentBytes()},
-                 {"bytes_read", bytes_read},
-                 {"first_image_ms", record.first_image_ms},
-                 {"converged_ms", record.converged_ms}};
-    return {{"model", files_.size() == 1 ? Json(files_[0]) : Json(files_)},
-            {"renderer", renderer_},
-            {"size", {size_.width, size_.height}},
-            {"pixels", pixels_},
-            {"summary", summary},
-            {"frames", frames}};
+std::string sentence(const FlightRecord& record, const Json& summary) {
+    return fmt::format(
+        "{} frames in {:.1f} s; a frame {:.1f} ms (median), {:.1f} ms (99 %); {} triangles/s; "
+        "first image after {:.0f} ms, converged {:.0f} ms after the last frame",
+        record.frames.size(), record.seconds, summary["ms_of_all"]["median"].get<double>(),
+        summary["ms_of_all"]["p99"].get<double>(),
+        formatCount(summary["triangles_per_second"].get<double>()), record.first_image_ms,
+        record.converged_ms);
 }
 
-int BenchVerb::run(const RunContext& context) {
-    const ThreadLimit threads(Limits{{}, jobs_}.threads());
-    checkOutput(context.common.report, context.common.force);
-    if (cold_)
-        for (const std::string& file : files_) dropSystemCache(file);
-    const ModelFiles files(files_);
-    const CameraPath camera_path = path(files);
-    FlightSettings flight = settings(camera_path);
-    flight.gl_messages = glMessages(context.common);
-    context.progress.setStages(1);
-    context.progress.beginStage("fly", uint64_t(flight.frames));
-    FlightRecord record;
+Json BenchVerb::report(const BenchRecord& record, const CameraPath& path) const {
+    Json report{
+        {"model", files_.size() == 1 ? Json(files_[0]) : Json(files_)},
+        {"renderer", renderer_},
+        {"size", {size_.width, size_.height}},
+        {"pixels", pixels_},
+        {"about", fmt::format("{}, {}x{}, {} px, {} samples, {} for pages, {}{}; {}", path_,
+                              size_.width, size_.height, pixels_, samples_, formatBytes(ram_),
+                              renderer_, cold_ ? ", cold" : "", machine())}};
+    report.update(flightJson(record.flight, pixels_, cold_));
+    report["summary"]["peak_rss_bytes"] = record.peak_bytes;
+    report["summary"]["rss_before_bytes"] = record.process_bytes_before;
+    if (record.without_prefetch)
+        report["without_prefetch"] = flightJson(*record.without_prefetch, pixels_, false);
+    if (record.without_drawing)
+        report["without_drawing"] = flightJson(*record.without_drawing, pixels_, false);
+    report["path"] = Json::parse(cameraPathText(path));
+    return report;
+}
+
+/// Of cold flights, before each.
+void BenchVerb::dropCaches() const {
+    for (const std::string& file : files_)
+        if (const uint64_t left = dropPageCache(file); left > 0)
+            logWarning(fmt::format("{}: the system still caches {} of it: this is no cold flight",
+                                   file, formatBytes(left)));
+}
+
+FlightRecord BenchVerb::flyOnce(const ModelFiles& files, const CameraPath& path,
+                                const FlightSettings& settings, const char* stage,
+                                Progress& progress) const {
+    if (cold_) dropCaches();
+    progress.beginStage(stage, uint64_t(settings.frames) * (settings.compare ? 2 : 1));
     try {
-        record = fly(files.views(), camera_path, flight, [&](int) { context.progress.tick(1); });
+        FlightRecord record = fly(files.views(), path, settings, [&](int) { progress.tick(1); });
+        progress.endStage();
+        return record;
     } catch (const MemoryError& error) {
         throw MemoryError(memoryMessage(ram_, renderer_ == "gl" ? vram_ : 0, error));
     } catch (const UsageError& error) {
         throw UsageError(fmt::format("--renderer {}: {}", renderer_, error.what()));
     }
-    context.progress.endStage();
-    for (const std::string& fault : record.faults) logWarning(fault);
-    const Json json = report(record);
-    const Json& summary = json["summary"];
-    logInfo(fmt::format(
-        "{} frames in {:.1f} s; a frame {:.1f} ms (median), {:.1f} ms (99 %); {} triangles/s; "
-        "first image after {:.0f} ms, converged {:.0f} ms after the last frame",
-        record.frames.size(), record.seconds, summary["ms"]["median"].get<double>(),
-        summary["ms"]["p99"].get<double>(),
-        formatCount(summary["triangles_per_second"].get<double>()), record.first_image_ms,
-        record.converged_ms));
+}
+
+int BenchVerb::run(const RunContext& context) {
+    const ThreadLimit threads(Limits{{}, jobs_}.threads());
+    checkOutput(context.common.report, context.common.force);
+    checkOutput(html_, context.common.force);
+    BenchRecord record;
+    record.process_bytes_before = residentBytes();
+    if (cold_) dropCaches();
+    const ModelFiles files(files_);
+    const CameraPath camera_path = path(files);
+    FlightSettings flight = settings(camera_path);
+    flight.gl_messages = glMessages(context.common);
+    const bool variants = !html_.empty() && flight.compare;
+    context.progress.setStages(variants ? 3 : 1);
+    record.flight = flyOnce(files, camera_path, flight, "fly", context.progress);
+    record.peak_bytes = peakResidentBytes();
+    flight.compare = false;
+    if (variants) {
+        flight.prefetch = false;
+        record.without_prefetch =
+            flyOnce(files, camera_path, flight, "fly without prefetching", context.progress);
+        flight.prefetch = prefetch_ == "on";
+        flight.draw = FlightSettings::Draw::kNothing;
+        record.without_drawing =
+            flyOnce(files, camera_path, flight, "fly without drawing", context.progress);
+    }
+    for (const std::string& fault : record.flight.faults) logWarning(fault);
+    const Json json = report(record, camera_path);
+    logInfo(sentence(record.flight, json["summary"]));
     writeReport(context.common.report, json, context.common.force);
+    if (!html_.empty()) writeText(html_, flightPage(record, json), context.common.force);
     return 0;
 }
 
