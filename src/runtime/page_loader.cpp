@@ -1,9 +1,17 @@
 #include "runtime/page_loader.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <iterator>
 
 namespace pietra {
+namespace {
+
+/// Where all cores are busy, drawing goes before loading, but does not starve it.
+constexpr int kNiceness = 5;
+
+}  // namespace
 
 PageLoader::PageLoader(std::vector<const ModelReader*> models, int threads)
     : models_(std::move(models)) {
@@ -58,6 +66,7 @@ bool PageLoader::next(PageKey& key) {
 
 void PageLoader::work() {
     std::vector<std::byte> bytes;
+    [[maybe_unused]] const int level = ::nice(kNiceness);  // on Linux, of this thread alone
     for (PageKey key; next(key);) {
         LoadedPage loaded{key, {}, {}};
         const ModelReader& model = *models_[key.model];
