@@ -44,12 +44,13 @@ SceneModel::SceneModel(const ModelReader& r)
       arriving(r.pageCount(), 0),
       bad(r.pageCount(), 0) {}
 
-PagePool::PagePool(SceneModels& models, size_t ram_bytes, int loader_threads, PageSink* sink)
+PagePool::PagePool(SceneModels& models, size_t ram_bytes, size_t table_bytes, int loader_threads,
+                   PageSink* sink)
     : models_(models),
       sink_(sink),
-      ram_(ram_bytes),
+      ram_(ram_bytes - std::min(ram_bytes, table_bytes)),
       device_(sink != nullptr ? sink->capacityBytes() : 0) {
-    loadRoots();
+    loadRoots(table_bytes);
     std::vector<const ModelReader*> readers;
     for (const auto& model : models) readers.push_back(&model->reader);
     loader_ = std::make_unique<PageLoader>(std::move(readers), loader_threads);
@@ -62,12 +63,13 @@ PagePool::~PagePool() {
             if (models_[m]->residency.resident(page)) sink_->release({m, page});
 }
 
-void PagePool::loadRoots() {
+void PagePool::loadRoots(size_t table_bytes) {
     size_t needed = 0;
     for (const auto& model : models_)
         for (const PageIndex page : rootPages(model->forest)) needed += model->copy_bytes[page];
     if (needed > ram_.budget)
-        throw MemoryError(fmt::format("the coarsest level needs {}", formatBytes(needed)));
+        throw MemoryError(fmt::format("the tables and the coarsest level need {}",
+                                      formatBytes(table_bytes + needed)));
     for (uint32_t m = 0; m < models_.size(); ++m)
         for (const PageIndex page : rootPages(models_[m]->forest)) {
             models_[m]->reader.decode(page, models_[m]->copies[page]);
@@ -186,6 +188,7 @@ void PagePool::reserve(std::span<const PageKey> begun) {
         if (!modelOf(key).residency.resident(key.page))
             device_.reserved += modelOf(key).drawn_bytes[key.page];
     }
+    begun_bytes_ = ram_.reserved;
     for (const PageKey& key : arriving_) device_.reserved += modelOf(key).drawn_bytes[key.page];
 }
 

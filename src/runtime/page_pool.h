@@ -25,9 +25,11 @@ using SceneModels = std::vector<std::unique_ptr<SceneModel>>;
 
 class PagePool {
 public:
-    /// `models` and `sink`, if any, must outlive this. Loads the roots, waiting for them. Throws
-    /// MemoryError, which says how much is needed, if they do not fit, and what reading throws.
-    PagePool(SceneModels& models, size_t ram_bytes, int loader_threads, PageSink* sink);
+    /// `models` and `sink`, if any, must outlive this. Of `ram_bytes`, `table_bytes` are taken.
+    /// Loads the roots, waiting for them. Throws MemoryError, which says how much is needed, if
+    /// they do not fit, and what reading throws.
+    PagePool(SceneModels& models, size_t ram_bytes, size_t table_bytes, int loader_threads,
+             PageSink* sink);
     ~PagePool();
     PagePool(const PagePool&) = delete;
     PagePool& operator=(const PagePool&) = delete;
@@ -46,7 +48,7 @@ public:
     /// Of what may be drawn.
     const PageMemory& drawn() const { return sink_ != nullptr ? device_ : ram_; }
     /// In RAM, what is on its way included.
-    size_t ramBytes() const { return ram_.used + ram_.reserved; }
+    size_t ramBytes() const { return ram_.used + begun_bytes_; }
     size_t deviceBytes() const { return device_.used; }
     uint64_t bytesRead() const { return loader_->bytesRead(); }
     const std::vector<std::string>& faults() const { return faults_; }
@@ -58,7 +60,7 @@ private:
     };
 
     SceneModel& modelOf(const PageKey& key) const { return *models_[key.model]; }
-    void loadRoots();
+    void loadRoots(size_t table_bytes);
     void keep(LoadedPage& page);
     bool tryArrive(const PageKey& key, size_t& upload_left);
     bool enter(const PageKey& key);
@@ -75,6 +77,7 @@ private:
     SceneModels& models_;
     PageSink* const sink_;
     PageMemory ram_, device_;
+    size_t begun_bytes_ = 0;  // being loaded
     uint32_t frame_ = 0;
     std::vector<Wanted> wanted_;
     std::vector<LoadedPage> loaded_;

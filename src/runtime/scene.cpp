@@ -26,11 +26,18 @@ double msSince(Clock::time_point start) {
 
 }  // namespace
 
+size_t tableBytes(const ModelReader& model) {
+    constexpr size_t kBesideNode = 48;  // forest.h, residency.h, forest_refiner.h
+    return model.nodes().size() * (sizeof(Node) + kBesideNode);
+}
+
 class Scene::Impl {
 public:
     Impl(const std::vector<const ModelReader*>& readers, const SceneSettings& settings)
         : models_(makeModels(readers)),
-          pages_(models_, settings.ram_bytes, settings.loader_threads, settings.sink) {}
+          table_bytes_(tablesOf(readers)),
+          pages_(models_, settings.ram_bytes, table_bytes_, settings.loader_threads,
+                 settings.sink) {}
 
     const Frame& update(const FrameRequest& request);
     bool idle() const { return !pages_.blocked() && pages_.missing() == 0; }
@@ -44,6 +51,7 @@ private:
     };
 
     static SceneModels makeModels(const std::vector<const ModelReader*>& readers);
+    static size_t tablesOf(const std::vector<const ModelReader*>& readers);
     void select(const FrameRequest& request);
     void wantMissing();
     void prefetch(const FrameRequest& request);
@@ -52,6 +60,7 @@ private:
     void describe(const SceneModel& model, uint32_t m, bool show_error, ModelFrame& out) const;
 
     SceneModels models_;
+    const size_t table_bytes_;
     PagePool pages_;
     std::vector<Missing> missing_;
     std::vector<PageKey> missing_for_eye_;
@@ -63,6 +72,12 @@ private:
     Frame frame_;
     Selection scratch_;
 };
+
+size_t Scene::Impl::tablesOf(const std::vector<const ModelReader*>& readers) {
+    size_t bytes = 0;
+    for (const ModelReader* reader : readers) bytes += tableBytes(*reader);
+    return bytes;
+}
 
 SceneModels Scene::Impl::makeModels(const std::vector<const ModelReader*>& readers) {
     SceneModels models;
@@ -83,7 +98,7 @@ const Frame& Scene::Impl::update(const FrameRequest& request) {
     adaptTolerance();
     last_camera_ = request.camera;
     last_seconds_ = request.seconds;
-    frame_.resident_bytes = pages_.ramBytes();
+    frame_.resident_bytes = pages_.ramBytes() + table_bytes_;
     frame_.device_bytes = pages_.deviceBytes();
     frame_.bytes_read = pages_.bytesRead();
     frame_.select_ms = msSince(start) - frame_.publish_ms;

@@ -22,12 +22,16 @@
 namespace pietra {
 
 struct SceneSettings {
-    size_t ram_bytes = size_t(1) << 30;  ///< of decoded pages, those being decoded included
+    /// Of decoded pages, those being decoded included, and of the models' tables.
+    size_t ram_bytes = size_t(1) << 30;
     int loader_threads = 2;
     /// What pages must be in to be drawn; must outlive the scene, and have room for pages alone.
     /// Null: they are drawn from RAM.
     PageSink* sink = nullptr;
 };
+
+/// What the table of nodes and what is made of it take, about.
+size_t tableBytes(const ModelReader& model);
 
 /// What a frame asks for.
 struct FrameRequest {
@@ -56,7 +60,7 @@ struct Frame {
     double tolerance_px = 0;
     bool converged = false;  ///< nothing is missing, at the tolerance asked for
     uint64_t triangles = 0, patch_count = 0;
-    size_t resident_bytes = 0;  ///< in RAM
+    size_t resident_bytes = 0;  ///< in RAM, tables included
     size_t device_bytes = 0;    ///< in the sink
     uint64_t bytes_read = 0;    ///< since the beginning
     double publish_ms = 0, select_ms = 0;
