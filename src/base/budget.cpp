@@ -1,5 +1,6 @@
 #include "base/budget.h"
 
+#include <malloc.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -73,6 +74,10 @@ size_t residentBytes() {
 }
 size_t peakResidentBytes() {
     return statusField("VmHWM:");
+}
+
+void shareHeap() {
+    ::mallopt(M_ARENA_MAX, 1);
 }
 
 size_t machineMemoryBytes() {

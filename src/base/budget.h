@@ -55,6 +55,10 @@ private:
 /// Resident set of this process, now and at its peak (VmRSS, VmHWM), in bytes.
 size_t residentBytes();
 size_t peakResidentBytes();
+/// Has threads that are yet to come allocate from one heap: what one of them frees, another can use,
+/// so the resident set stays near what is in use. For programs that are to keep a budget while some
+/// threads load and others drop.
+void shareHeap();
 /// Physical memory of the machine or the cgroup's limit, whichever is smaller, in bytes.
 size_t machineMemoryBytes();
 

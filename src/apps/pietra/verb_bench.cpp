@@ -210,6 +210,7 @@ FlightRecord BenchVerb::flyOnce(const ModelFiles& files, const CameraPath& path,
 }
 
 int BenchVerb::run(const RunContext& context) {
+    shareHeap();
     const ThreadLimit threads(Limits{{}, jobs_}.threads());
     checkOutput(context.common.report, context.common.force);
     checkOutput(html_, context.common.force);

@@ -6,6 +6,7 @@
 #include "apps/pietra/limits.h"
 #include "apps/pietra/logging.h"
 #include "apps/pietra/verbs.h"
+#include "base/budget.h"
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/text.h"
@@ -69,6 +70,7 @@ void ViewVerb::declare(OptionSet& options) {
 }
 
 int ViewVerb::run(const RunContext& context) {
+    shareHeap();
     const ThreadLimit threads(Limits{{}, jobs_}.threads());
     for (const std::string& file : files_)
         if (!isModelFile(file)) checkMeshFormat(file);
