@@ -160,6 +160,7 @@ void PagePool::load() {
     blocked_ = scattered_bytes_ > 0 && !makeRoomToDraw(scattered_bytes_, Need::kDraw);
     for (const Wanted& wanted : wanted_) {
         missing_ += wanted.need != Need::kLater;
+        if (wanted.need == Need::kDraw) keepWhatWaitsFor(wanted.key);
         if (modelOf(wanted.key).arriving[wanted.key.page] != 0 ||
             std::find(begun.begin(), begun.end(), wanted.key) != begun.end())
             continue;
@@ -177,6 +178,16 @@ void PagePool::forgetUnwanted() {
         if (sink_ == nullptr) dropCopy(key);
         return true;
     });
+}
+
+/// Else two pages that only together let a group be refined may drive each other out for ever.
+void PagePool::keepWhatWaitsFor(const PageKey& key) {
+    SceneModel& model = modelOf(key);
+    for (const PageIndex above : model.residency.pagesAbove(key.page))
+        model.last_used[above] = frame_;
+    for (const uint32_t group : model.residency.groupsAbove(key.page))
+        for (const PageIndex sibling : model.residency.childPages(group))
+            model.last_used[sibling] = frame_;
 }
 
 void PagePool::reserve(std::span<const PageKey> begun) {
@@ -262,7 +273,7 @@ std::vector<PageMemory::Victim> PagePool::pagesToLeave() const {
 
 bool PagePool::leave(const PageKey& key) {
     SceneModel& model = modelOf(key);
-    if (!model.residency.mayLeave(key.page)) return false;
+    if (!model.residency.mayLeave(key.page) || model.last_used[key.page] == frame_) return false;
     model.residency.leave(key.page);
     if (sink_ == nullptr) return dropCopy(key);
     sink_->release(key);

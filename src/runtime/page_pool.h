@@ -65,6 +65,7 @@ private:
     bool tryArrive(const PageKey& key, size_t& upload_left);
     bool enter(const PageKey& key);
     void forgetUnwanted();
+    void keepWhatWaitsFor(const PageKey& key);
     void reserve(std::span<const PageKey> begun);
     bool provide(const Wanted& wanted, std::vector<PageKey>& to_load);
     bool makeRoomInRam(size_t bytes, Need need);

@@ -58,6 +58,10 @@ public:
     std::span<const uint32_t> pagesAbove(PageIndex page) const { return above_.of(page); }
     /// Pages of the children of a group's nodes.
     std::span<const uint32_t> childPages(uint32_t group) const { return child_pages_.of(group); }
+    /// Groups of whose nodes it holds children.
+    std::span<const uint32_t> groupsAbove(PageIndex page) const {
+        return groups_above_page_.of(page);
+    }
     /// Groups that must be refined before this one.
     std::span<const uint32_t> parentGroups(uint32_t group) const {
         return parent_groups_.of(group);
