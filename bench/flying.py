@@ -26,7 +26,8 @@ def fly(model, path, kind, options):
     if options.html:
         extra += ["--html", f"{options.folder}/{name}.html"]
     report = common.report("bench", model, "--path", path, "--size", options.size, "--pixels",
-                           options.pixels, "--ram", options.ram, "--renderer", options.renderer,
+                           options.pixels, "--ram", options.ram, "--renderer", options.renderer, "--up",
+                           options.up,
                            *extra, folder=options.folder)
     pathlib.Path(options.folder, f"{name}.json").write_text(json.dumps(report))
     return report["summary"]
@@ -77,6 +78,7 @@ def main():
     parser.add_argument("--pixels", default=1)
     parser.add_argument("--ram", default="1G")
     parser.add_argument("--renderer", default="cpu")
+    parser.add_argument("--up", default="z")
     parser.add_argument("--html", action="store_true", help="pages with graphs, too: twice more flights")
     parser.add_argument("--views", type=int, default=0, help="measure errors in so many views")
     parser.add_argument("--folder", default="bench-output")

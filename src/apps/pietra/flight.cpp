@@ -152,12 +152,15 @@ private:
     }
 
     void compareWithStaticDraws(const std::function<void(int)>& progress) {
+        const auto start = Clock::now();
         std::vector<double> ratios;
         const int step = std::max(1, settings_.frames / kSampledFrames);
         for (int i = 0; i < settings_.frames; ++i) {
             FrameRequest view = request(i);
             view.prefetch = false;
             const Frame& resident = scene_.converge(view);
+            // At the flight's own pace: threads that wake up and cold caches are no overhead.
+            if (settings_.real_time) waitFor(start, timeOf(i));
             record_.frames[i].static_ms = draw(resident, patchesOf(resident));
             if (i % step == 0) ratios.push_back(overhead(view, resident));
             progress(i);
