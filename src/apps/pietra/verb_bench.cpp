@@ -76,7 +76,7 @@ VerbText BenchVerb::text() const {
          {"a recorded flight, as a user sees it after a reboot",
           "pietra bench moon.pietra --path flight.json --cold --report r.json"},
          {"what Adaptive TetraPuzzles were measured by, with a page of graphs",
-          "pietra bench moon.pietra --path inspection --size 800x600 --pixels 2 --samples 4 --cold "
+          "pietra bench m.pietra --path inspection --size 800x600 --pixels 2 --samples 4 --cold "
           "--html r.html"}},
         "Paths that every model has",
         {{"orbit", "around the whole, from above and below"},
