@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "simplify/edge_kernels.h"
 #include "simplify/position_set.h"
@@ -63,6 +64,8 @@ public:
 
     /// After a collapse: the triangles around the vertex that remains, with its neighbours.
     const Ring& ring() const { return ring_; }
+    /// Of the collapse just allowed.
+    std::span<const Wing> wings() const { return {wing_.data(), wing_count_}; }
 
 private:
     bool readFirstRing(uint32_t u, uint32_t v);

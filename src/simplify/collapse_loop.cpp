@@ -19,8 +19,9 @@ constexpr float kMinShapeWhenStuck = 3e-6f;
 
 }  // namespace
 
-void CollapseLoop::run(const SnapGrid& grid, float free_error) {
+void CollapseLoop::run(const SnapGrid& grid, float free_error, CollapseSink* sink) {
     grid_ = grid;
+    sink_ = sink;
     queue_.clear();
     collapses_ = 0;
     worst_deviation_sq_ = 0;
@@ -187,6 +188,8 @@ bool CollapseLoop::collapse(uint32_t lane) {
         queue_.push(cost, {u, v, candidates_.stamp[lane]});
         return false;
     }
+    if (sink_ && !sink_->take({mesh_, u, v, at, deviation, collapser_.ring(), collapser_.wings()}))
+        return false;
     collapser_.apply(u, v, at);
     std::array<float, kMaxQuadricAttributes> values;
     for (uint32_t j = 0; j < attributes_.view().count; ++j) values[j] = edges.value[j][lane];

@@ -9,6 +9,7 @@
 #include "simplify/attributes.h"
 #include "simplify/collapse.h"
 #include "simplify/collapse_queue.h"
+#include "simplify/collapse_sink.h"
 #include "simplify/edge_kernels.h"
 #include "simplify/position_set.h"
 #include "simplify/working_mesh.h"
@@ -22,7 +23,8 @@ public:
 
     /// Ranks and quadrics of the mesh must be set. `grid`: where new vertices may lie.
     /// `free_error`: as in SimplifyInput.
-    void run(const SnapGrid& grid, float free_error);
+    /// `sink`: told of each collapse, may forbid it; or null.
+    void run(const SnapGrid& grid, float free_error, CollapseSink* sink = nullptr);
 
     /// Of the last run.
     uint32_t collapses() const { return collapses_; }
@@ -68,6 +70,7 @@ private:
     uint32_t pending_count_ = 0;
     Candidates candidates_;
     uint32_t current_bucket_ = 0;
+    CollapseSink* sink_ = nullptr;
     uint32_t collapses_ = 0;
     float worst_deviation_sq_ = 0;
     float limit_sq_ = HUGE_VALF;  // mean squared distance that no collapse may exceed

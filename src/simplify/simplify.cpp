@@ -127,11 +127,11 @@ void Simplifier::run(const SimplifyInput& input, SimplifyOutput& output) {
     s.attributes.load(in, uint32_t(input.scalar_count), input.scalar_range, extentOf(s.mesh));
     output.locked_vertices = s.classifier.run(s.mesh);
     buildQuadrics(s.mesh, s.attributes);
-    s.loop.run(gridOf(s.mesh, input.shift), input.free_error);
+    s.loop.run(gridOf(s.mesh, input.shift), input.free_error, input.sink);
     output.collapses = s.loop.collapses();
     output.estimated_error = s.loop.worstDeviation();
     output.clustered = output.dropped_triangles = 0;
-    if (s.mesh.cells_above > 0) s.fallBack(input.free_error, output);
+    if (s.mesh.cells_above > 0 && !input.sink) s.fallBack(input.free_error, output);
     s.storeVertices(in, output);
     s.storeTriangles(in, output);
 }

@@ -35,6 +35,8 @@
 
 namespace pietra {
 
+class CollapseSink;
+
 /// "No vertex" or "no triangle" in the maps.
 inline constexpr uint32_t kNone = 0xffffffffu;
 
@@ -62,6 +64,9 @@ struct SimplifyInput {
     /// One a scalar: the width of its range over the whole model, which counts as much as that of a
     /// colour. Empty: its range in this mesh.
     std::span<const float> scalar_range;
+    /// Told of each collapse, may forbid it; or null. With a sink there is no fallback: what
+    /// collapses do not reach stays.
+    CollapseSink* sink = nullptr;
 };
 
 struct SimplifyOutput {

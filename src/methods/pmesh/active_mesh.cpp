@@ -1,0 +1,264 @@
+#include "methods/pmesh/active_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/check.h"
+#include "base/parallel.h"
+
+namespace pietra::pmesh {
+namespace {
+
+constexpr size_t kGrain = 256;
+constexpr auto kRelaxed = std::memory_order_relaxed;
+
+/// At most the radius that remains of the operation's sphere around its u.
+uint16_t radiusAroundU(const Operation& o) {
+    const Vec3d d(o.offset(1));
+    const int64_t rest = int64_t(decodeRadius(o.radius)) - int64_t(std::sqrt(glm::dot(d, d))) - 1;
+    if (rest <= 0) return 0;
+    const uint32_t code = encodeRoundedUp<11>(uint64_t(rest));
+    return uint16_t(decodeRadius(code) > rest ? code - 1 : code);
+}
+
+}  // namespace
+
+ActiveMesh::ActiveMesh(const ProgressiveMesh& mesh) : source_(&mesh) {
+    HalfEdges edges = findHalfEdges(mesh.base_triangle, mesh.base_vertex.size());
+    vertex = mesh.base_vertex;
+    record.resize(vertex.size());
+    criteria.resize(vertex.size());
+    for (uint32_t v = 0; v < vertex.size(); ++v) {
+        record[v].name = v;
+        record[v].corner = edges.corner_of[v];
+        setLast(v, kNoOperation);
+        setNext(v, mesh.base_operation[v]);
+    }
+    for (const Triangle& t : mesh.base_triangle) index.insert(index.end(), t.begin(), t.end());
+    twin = std::move(edges.twin);
+}
+
+void ActiveMesh::resize(size_t vertices, size_t faces) {
+    vertex.resize(vertices);
+    record.resize(vertices);
+    criteria.resize(vertices);
+    index.resize(3 * faces);
+    twin.resize(3 * faces);
+}
+
+void ActiveMesh::setNext(uint32_t v, OperationId next) {
+    record[v].next = next;
+    const bool none = next == kNoOperation;
+    record[v].next_level = none ? uint16_t(kLeafLevel) : source_->operation[next].level;
+    criteria[v].split_radius = none ? uint16_t(0) : source_->operation[next].radius;
+    criteria[v].split_error = none ? uint8_t(0) : source_->operation[next].error;
+}
+
+void ActiveMesh::setLast(uint32_t v, OperationId last) {
+    VertexRecord& r = record[v];
+    r.last = last;
+    r.last_level =
+        last == kNoOperation ? uint16_t(0) : uint16_t(source_->operation[last].level + 1);
+    const bool fresh = isFreshU(v);
+    criteria[v].merge_radius =
+        fresh ? radiusAroundU(source_->operation[last]) : VertexCriteria::kEverNeeded;
+    criteria[v].merge_error = fresh ? source_->operation[last].error : uint8_t(0);
+}
+
+bool ActiveMesh::readStar(uint32_t v, Star& star) const {
+    const uint32_t first = record[v].corner;
+    uint32_t least = 0, least_name = ~0u, count = 0, c = first;
+    do {
+        if (count == kMaxNeighbours) return false;
+        const uint32_t name = record[vertexAt(nextCorner(c))].name;
+        if (name < least_name) least = count, least_name = name;
+        star.corner[count++] = c;
+        c = leftOf(c);
+    } while (c != first && c != kNoCorner);
+    star.count = count;
+    star.closed = c == first;
+    if (star.closed)
+        std::rotate(star.corner.begin(), star.corner.begin() + least, star.corner.begin() + count);
+    return star.neighbours() <= kMaxNeighbours;
+}
+
+uint32_t ActiveMesh::partnerOf(uint32_t u) const {
+    uint32_t v = kNoCorner;
+    allNeighbours(u, [&](uint32_t w) {
+        if (record[w].last == record[u].last) v = w;
+        return v == kNoCorner;
+    });
+    return v;
+}
+
+void ActiveMesh::link(uint32_t half_edge, uint32_t other) {
+    if (half_edge != kNoCorner) twin[slotOf(half_edge)] = other;
+    if (other != kNoCorner) twin[slotOf(other)] = half_edge;
+}
+
+/// The first corner of the open fan that has this one.
+uint32_t ActiveMesh::firstCorner(uint32_t corner) const {
+    for (uint32_t t; (t = twinOf(corner)) != kNoCorner;) corner = nextCorner(t);
+    return corner;
+}
+
+void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t face) {
+    const OperationId id = record[v].next;
+    const Operation& o = source_->operation[id];
+    const uint32_t n = star.count, l = o.rankLeft(), r = o.rankRight();
+    const bool has_left = l != kNoRank, has_right = r != kNoRank;
+    // A triangle of the star by its place; beyond an open fan's ends there is none.
+    const auto triangle = [&](uint32_t i) {
+        if (i < n) return star.corner[i];
+        return star.closed ? star.corner[i == n ? 0 : n - 1] : kNoCorner;
+    };
+    const uint32_t vl = has_left ? neighbour(star, l) : 0;
+    const uint32_t vr = has_right ? neighbour(star, r) : 0;
+
+    const uint32_t begin = has_right ? r : 0, end = has_left ? l : n;
+    for (uint32_t i = begin, left = end >= begin ? end - begin : n - begin + end; left > 0;
+         --left) {
+        index[slotOf(star.corner[i])] = u;
+        if (++i == n) i = 0;
+    }
+    const uint32_t fl = 4 * face, fr = has_left ? fl + 4 : fl;
+    if (has_left) {
+        const uint32_t of_u = triangle(l - 1), of_v = triangle(l);
+        std::copy_n(std::array{v, u, vl}.begin(), 3, &index[slotOf(fl)]);
+        link(fl, has_right ? fr : kNoCorner);
+        link(fl + 1, of_u == kNoCorner ? kNoCorner : previousCorner(of_u));
+        link(fl + 2, of_v);
+        if (of_v == kNoCorner) corner(vl).store(fl + 2, kRelaxed);
+    }
+    if (has_right) {
+        const uint32_t of_v = triangle(r - 1), of_u = triangle(r);
+        std::copy_n(std::array{u, v, vr}.begin(), 3, &index[slotOf(fr)]);
+        if (!has_left) link(fr, kNoCorner);
+        link(fr + 1, of_v == kNoCorner ? kNoCorner : previousCorner(of_v));
+        link(fr + 2, of_u);
+        if (of_u == kNoCorner) corner(vr).store(fr + 2, kRelaxed);
+    }
+    VertexRecord& a = record[v];
+    VertexRecord& b = record[u];
+    a.corner = has_left ? fl : fr + 1;
+    b.corner = has_left ? fl + 1 : fr;
+    if (!star.closed) a.corner = firstCorner(a.corner), b.corner = firstCorner(b.corner);
+
+    b.name = source_->nameOf(id);
+    b.undo_last = a.last;
+    b.undo_normal = uint16_t(vertex[v].normal);
+    vertex[u] = vertex[v];
+    vertex[u].moveBy(o.offset(1));
+    vertex[u].normal = o.normal[1];
+    vertex[v].moveBy(o.offset(0));
+    vertex[v].normal = o.normal[0];
+    setLast(v, id);
+    setLast(u, id);
+    setNext(v, o.child[0]);
+    setNext(u, o.child[1]);
+}
+
+std::array<uint32_t, 2> ActiveMesh::merge(uint32_t v, uint32_t u) {
+    VertexRecord& a = record[v];
+    VertexRecord& b = record[u];
+    const bool open = twinOf(a.corner) == kNoCorner || twinOf(b.corner) == kNoCorner;
+    uint32_t fl = kNoCorner, fr = kNoCorner;  // their first corners: of v, of u
+    for (uint32_t c = b.corner; c != kNoCorner;) {
+        index[slotOf(c)] = v;
+        if (vertexAt(previousCorner(c)) == v) fl = previousCorner(c);
+        if (vertexAt(nextCorner(c)) == v) fr = c;
+        c = leftOf(c);
+        if (c == b.corner) break;
+    }
+    uint32_t stays = kNoCorner;
+    if (fl != kNoCorner) {
+        const uint32_t of_u = twinOf(fl + 1), of_v = twinOf(fl + 2), vl = vertexAt(fl + 2);
+        link(of_u, of_v);
+        if (corner(vl).load(kRelaxed) == fl + 2) corner(vl).store(of_u, kRelaxed);
+        stays = of_v != kNoCorner ? of_v : nextCorner(of_u);
+    }
+    if (fr != kNoCorner) {
+        const uint32_t of_v = twinOf(fr + 1), of_u = twinOf(fr + 2), vr = vertexAt(fr + 2);
+        link(of_v, of_u);
+        if (corner(vr).load(kRelaxed) == fr + 2) corner(vr).store(of_v, kRelaxed);
+        if (fl == kNoCorner) stays = of_u != kNoCorner ? of_u : nextCorner(of_v);
+    }
+    a.corner = open ? firstCorner(stays) : stays;
+
+    const OperationId id = a.last;
+    vertex[v].moveBy(-source_->operation[id].offset(0));
+    vertex[v].normal = b.undo_normal;
+    setLast(v, b.undo_last);
+    setNext(v, id);
+    b.name = kNoCorner;
+    return {fl == kNoCorner ? fl : fl >> 2, fr == kNoCorner ? fr : fr >> 2};
+}
+
+namespace {
+
+/// Pairs the elements at or beyond `count` that stay with the holes below it: the elements go to
+/// `from`, in increasing order, and `free` keeps the holes, in its order.
+void pairWithHoles(std::vector<uint32_t>& free, size_t count, size_t size,
+                   std::vector<uint32_t>& from) {
+    std::vector<uint8_t> gone(size - count, 0);
+    for (const uint32_t f : free)
+        if (f >= count) gone[f - count] = 1;
+    std::erase_if(free, [&](uint32_t f) { return f >= count; });
+    from.clear();
+    for (size_t i = count; i < size; ++i)
+        if (!gone[i - count]) from.push_back(uint32_t(i));
+    CHECK_EQ(from.size(), free.size());
+}
+
+}  // namespace
+
+void ActiveMesh::fillHoles(std::vector<uint32_t>& free_vertices,
+                           std::vector<uint32_t>& free_faces) {
+    const size_t vertices = vertexCount() - free_vertices.size();
+    const size_t faces = faceCount() - free_faces.size();
+    std::vector<uint32_t> from;
+    pairWithHoles(free_faces, faces, faceCount(), from);
+    moveFaces(from, free_faces, faces);
+    resize(vertexCount(), faces);
+    pairWithHoles(free_vertices, vertices, vertexCount(), from);
+    parallelForSlices(from.size(), kGrain, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i) moveVertex(from[i], free_vertices[i]);
+    });
+    resize(vertices, faces);
+}
+
+void ActiveMesh::moveVertex(uint32_t from, uint32_t to) {
+    vertex[to] = vertex[from];
+    record[to] = record[from];
+    criteria[to] = criteria[from];
+    const uint32_t first = record[to].corner;
+    for (uint32_t c = first; c != kNoCorner;) {
+        index[slotOf(c)] = to;
+        c = leftOf(c);
+        if (c == first) break;
+    }
+}
+
+/// Two neighbours may both move: each asks for the other's new place, and tells only neighbours
+/// that stay.
+void ActiveMesh::moveFaces(const std::vector<uint32_t>& from, const std::vector<uint32_t>& to,
+                           size_t count) {
+    std::vector<uint32_t> new_place(faceCount() - count);
+    for (size_t i = 0; i < from.size(); ++i) new_place[from[i] - count] = to[i];
+    parallelForSlices(from.size(), kGrain, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i)
+            for (uint32_t k = 0; k < 3; ++k) {
+                const uint32_t old_corner = 4 * from[i] + k, new_corner = 4 * to[i] + k;
+                const uint32_t v = vertexAt(old_corner), t = twinOf(old_corner);
+                index[slotOf(new_corner)] = v;
+                if (corner(v).load(kRelaxed) == old_corner) corner(v).store(new_corner, kRelaxed);
+                if (t == kNoCorner || t >> 2 < count) {
+                    link(new_corner, t);
+                } else {
+                    twin[slotOf(new_corner)] = 4 * new_place[(t >> 2) - count] + (t & 3);
+                }
+            }
+    });
+}
+
+}  // namespace pietra::pmesh

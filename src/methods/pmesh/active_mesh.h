@@ -1,0 +1,137 @@
+#pragma once
+// The mesh that a progressive mesh has been refined to: dense arrays that change in place, an
+// element a vertex or a face, as a GPU would keep them (Derzapf et al. 2011, table 1).
+//
+// Where the paper gathers neighbourhoods by passes over all faces, each half-edge knows its twin
+// here. A split or a merge then walks its own star, and writes to nothing but
+//   - the vertices v and u,
+//   - the star's own triangles, and those that come or go,
+//   - the corner of a neighbour, if it is one of those that come or go.
+// No triangle lies in the stars of two operations of a pass (rules.h): so they run in any order, in
+// parallel, without atomics and without a copy, to the same bytes.
+//
+// Base vertices and base triangles keep their places for ever: refined and coarsened again, the
+// arrays are as they were.
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "methods/pmesh/operations.h"
+#include "methods/pmesh/twins.h"
+
+namespace pietra::pmesh {
+
+/// What the adaption knows of a vertex beside what is drawn.
+struct alignas(32) VertexRecord {
+    uint32_t name;
+    uint32_t corner;       ///< one of its corners; where the fan is open, the first
+    OperationId next;      ///< its next split, or kNoOperation
+    OperationId last;      ///< the split it came from last, or kNoOperation
+    uint16_t next_level;   ///< of `next`, or kLeafLevel
+    uint16_t last_level;   ///< 1 + that of `last`, or 0
+    uint16_t undo_normal;  ///< of the v of the split that made this one, u, as v was before
+    OperationId undo_last;
+};
+static_assert(sizeof(VertexRecord) == 32);
+
+/// The spheres and errors that a scan for work compares (criterion.h): those of the next split,
+/// around the vertex, and, where the vertex is u and as its split left it, those of that split;
+/// there the sphere is a smaller one around u, so that it tells in haste that nothing is to do.
+struct VertexCriteria {
+    uint16_t split_radius = 0;
+    uint16_t merge_radius = kEverNeeded;
+    uint8_t split_error = 0;
+    uint8_t merge_error = 0;
+    static constexpr uint16_t kEverNeeded = encodeRoundedUp<11>(1 << 28);
+};
+
+/// The triangles around a vertex that may split or be merged, counter-clockwise: a closed fan from
+/// the neighbour of the least name, an open one from its beginning.
+struct Star {
+    uint32_t count = 0;
+    bool closed = false;
+    std::array<uint32_t, kMaxNeighbours> corner;  ///< at the vertex
+    uint32_t neighbours() const { return closed ? count : count + 1; }
+};
+
+class ActiveMesh {
+public:
+    /// The base mesh. `mesh` must outlive this; validate() must find no fault.
+    explicit ActiveMesh(const ProgressiveMesh& mesh);
+
+    std::vector<Vertex> vertex;
+    std::vector<VertexRecord> record;
+    std::vector<VertexCriteria> criteria;
+    std::vector<uint32_t> index;  ///< three a face: what is drawn
+    std::vector<uint32_t> twin;   ///< three a face: a half-edge or kNoCorner
+
+    const ProgressiveMesh& source() const { return *source_; }
+    size_t vertexCount() const { return vertex.size(); }
+    size_t faceCount() const { return index.size() / 3; }
+    void resize(size_t vertices, size_t faces);
+
+    uint32_t vertexAt(uint32_t corner) const { return index[slotOf(corner)]; }
+    uint32_t twinOf(uint32_t half_edge) const { return twin[slotOf(half_edge)]; }
+    /// The corner at the same vertex in the next face counter-clockwise, or kNoCorner.
+    uint32_t leftOf(uint32_t corner) const { return twinOf(previousCorner(corner)); }
+
+    /// body(w) for each neighbour w of v, until it returns false; false then. v must not be
+    /// irregular.
+    template <class Body>
+    bool allNeighbours(uint32_t v, Body&& body) const;
+
+    /// False if v has too many neighbours to split.
+    [[nodiscard]] bool readStar(uint32_t v, Star& star) const;
+    uint32_t neighbour(const Star& star, uint32_t rank) const {
+        return rank < star.count ? vertexAt(nextCorner(star.corner[rank]))
+                                 : vertexAt(previousCorner(star.corner[star.count - 1]));
+    }
+    /// `u` is as the split that made it left it.
+    bool isFreshU(uint32_t u) const {
+        return record[u].last != kNoOperation && record[u].name == source_->nameOf(record[u].last);
+    }
+
+    /// The v of the split that u came from: a neighbour of u, if both still are as that split left
+    /// them; else kNoCorner.
+    uint32_t partnerOf(uint32_t u) const;
+
+    /// Performs the next split of v, whose star is `star`. u and the faces from `face` on, one for
+    /// each of the operation's ranks, are made; room for them must be there.
+    void split(uint32_t v, const Star& star, uint32_t u, uint32_t face);
+
+    /// Undoes the split that made v and u of one. Returns the faces that are free now, kNoCorner
+    /// for none. u is free too; its record's name is kNoCorner then.
+    std::array<uint32_t, 2> merge(uint32_t v, uint32_t u);
+
+    /// Moves the last elements into the places of these, all different, and shrinks the arrays.
+    void fillHoles(std::vector<uint32_t>& free_vertices, std::vector<uint32_t>& free_faces);
+
+private:
+    /// Of a neighbour: other operations may look at it, but only one has a reason to change it.
+    std::atomic_ref<uint32_t> corner(uint32_t v) { return std::atomic_ref(record[v].corner); }
+    void setNext(uint32_t v, OperationId next);
+    void setLast(uint32_t v, OperationId last);
+    void link(uint32_t half_edge, uint32_t other);
+    uint32_t firstCorner(uint32_t corner) const;
+    void moveVertex(uint32_t from, uint32_t to);
+    void moveFaces(const std::vector<uint32_t>& from, const std::vector<uint32_t>& to,
+                   size_t count);
+
+    const ProgressiveMesh* source_;
+};
+
+template <class Body>
+bool ActiveMesh::allNeighbours(uint32_t v, Body&& body) const {
+    const uint32_t first = record[v].corner;
+    for (uint32_t c = first;;) {
+        if (!body(vertexAt(nextCorner(c)))) return false;
+        const uint32_t before = previousCorner(c), left = twinOf(before);
+        if (left == kNoCorner) return body(vertexAt(before));
+        if (left == first) return true;
+        c = left;
+    }
+}
+
+}  // namespace pietra::pmesh

@@ -1,0 +1,61 @@
+#include "methods/pmesh/operations.h"
+
+#include <fmt/format.h>
+
+namespace pietra::pmesh {
+namespace {
+
+/// What an operation must not exceed: the criteria of the one above it.
+bool criteriaNest(const Operation& parent, const Operation& child, int end) {
+    if (child.error > parent.error) return false;
+    const Vec3l d(parent.offset(end));
+    const int64_t room = int64_t(decodeRadius(parent.radius)) - decodeRadius(child.radius);
+    return room >= 0 && d.x * d.x + d.y * d.y + d.z * d.z <= room * room;
+}
+
+std::string faultOf(const Operation& o) {
+    if (o.level > kMaxLevel)
+        return fmt::format("its level is {}, the largest is {}", o.level, kMaxLevel);
+    if (o.radius > kMaxRadiusCode) return fmt::format("its radius has the code {}", o.radius);
+    if (o.shift > 20) return fmt::format("its deltas are shifted by {}", o.shift);
+    if (o.rankLeft() == kNoRank && o.rankRight() == kNoRank) return "it has no neighbours";
+    if (o.rankLeft() == o.rankRight()) return "its neighbours have equal ranks";
+    return "";
+}
+
+}  // namespace
+
+std::string validate(const ProgressiveMesh& mesh) {
+    const size_t count = mesh.operation.size();
+    std::vector<uint8_t> has_parent(count, 0);
+    if (mesh.base_operation.size() != mesh.base_vertex.size())
+        return fmt::format("{} base vertices have {} operations", mesh.base_vertex.size(),
+                           mesh.base_operation.size());
+    for (const Triangle& t : mesh.base_triangle)
+        for (const uint32_t v : t)
+            if (v >= mesh.base_vertex.size()) return fmt::format("base vertex {} is not there", v);
+    for (const OperationId o : mesh.base_operation) {
+        if (o == kNoOperation) continue;
+        if (o >= count || has_parent[o]++) return fmt::format("operation {}: not a tree", o);
+    }
+    for (size_t o = 0; o < count; ++o) {
+        const Operation& op = mesh.operation[o];
+        if (const std::string fault = faultOf(op); !fault.empty())
+            return fmt::format("operation {}: {}", o, fault);
+        for (const int end : {0, 1}) {
+            const OperationId c = op.child[size_t(end)];
+            if (c == kNoOperation) continue;
+            if (c <= o || c >= count || has_parent[c]++)
+                return fmt::format("operation {}: not a tree", c);
+            if (mesh.operation[c].level <= op.level)
+                return fmt::format("operation {}: its level is not above its parent's", c);
+            if (!criteriaNest(op, mesh.operation[c], end))
+                return fmt::format("operation {}: its criteria exceed its parent's", c);
+        }
+    }
+    for (size_t o = 0; o < count; ++o)
+        if (!has_parent[o]) return fmt::format("operation {}: no parent", o);
+    return "";
+}
+
+}  // namespace pietra::pmesh
