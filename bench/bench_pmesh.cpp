@@ -1,35 +1,140 @@
 // Progressive meshes: what one costs to build, to store and to adapt.
 //
-//   bench_pmesh MESH... [--jobs N]
+//   bench_pmesh JOBS MESH...
+//
+// Printed for each mesh: the build; refining all of it from its base and coarsening it again; and
+// 300 frames of a camera that flies in from afar and turns, one pass a frame.
 
-#include <cstdio>
+#include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
 
 #include "base/parallel.h"
+#include "methods/pmesh/adaption.h"
 #include "methods/pmesh/in_core_builder.h"
 #include "methods/pmesh/whole_mesh.h"
 
-using namespace pietra;
+namespace {
 
-static double now() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+using namespace pietra;
+using namespace pietra::pmesh;
+
+double now() {
+    const auto t = std::chrono::steady_clock::now().time_since_epoch();
+    return std::chrono::duration<double>(t).count();
 }
 
-int main(int argc, char** argv) {
-    for (int i = 1; i < argc; ++i) {
-        Budget budget(size_t(8) << 30);
-        TempSpace space{"/tmp", &budget, size_t(1) << 30};
-        Progress progress;
-        const auto source = openSource({argv[i]});
-        double t = now();
-        pmesh::WholeMesh whole = pmesh::readWholeMesh(*source, argv[i], {}, space, progress);
-        std::printf("%s: %zu triangles, shift %d, read %.2f s\n", argv[i], whole.mesh.triangleCount(), whole.lattice.shift, now() - t);
-        t = now();
-        pmesh::BuildCounts counts;
-        const pmesh::ProgressiveMesh mesh = pmesh::buildInCore(std::move(whole.mesh), whole.lattice, budget, &counts);
-        std::printf("  built %.2f s: base %zu v %zu f, %zu operations, %u levels, irregular %llu; refused irregular %llu valence %llu imprecise %llu level %llu; inexact %llu, largest %u; RSS peak %zu MB\n",
-            now() - t, mesh.base_vertex.size(), mesh.base_triangle.size(), mesh.operation.size(), counts.levels,
-            (unsigned long long)counts.irregular_vertices, (unsigned long long)counts.refused.irregular, (unsigned long long)counts.refused.valence, (unsigned long long)counts.refused.imprecise, (unsigned long long)counts.refused.level, (unsigned long long)counts.inexact_ends, counts.largest_error, peakResidentBytes() >> 20);
-        std::printf("  validate: '%s'\n", pmesh::validate(mesh).c_str());
+void report(const ProgressiveMesh& mesh, const BuildCounts& counts, double seconds) {
+    std::printf(
+        "  built in %.2f s: base %zu vertices, %zu triangles; %zu operations, %llu dummies;"
+        " %u levels; %llu irregular vertices\n",
+        seconds, mesh.base_vertex.size(), mesh.base_triangle.size(), mesh.operation.size(),
+        static_cast<unsigned long long>(counts.dummies), counts.levels,
+        static_cast<unsigned long long>(counts.irregular_vertices));
+    std::printf(
+        "  refused by valence %llu, by level %llu; %llu ends inexact, by %u steps at most;"
+        " resident %zu MiB\n",
+        static_cast<unsigned long long>(counts.refused.valence),
+        static_cast<unsigned long long>(counts.refused.level),
+        static_cast<unsigned long long>(counts.inexact_ends), counts.largest_error,
+        peakResidentBytes() >> 20);
+}
+
+/// Passes to the end; operations a second.
+void settle(const char* what, Adaption& adaption, const Criterion& criterion) {
+    const double begin = now();
+    uint64_t operations = 0;
+    int passes = 0;
+    for (PassCounts counts; ++passes, (counts = adaption.pass(criterion)).operations() > 0;)
+        operations += counts.operations();
+    const double seconds = now() - begin;
+    std::printf("  %s: %llu operations in %d passes, %.1f ms: %.2f M/s; %zu faces\n", what,
+                static_cast<unsigned long long>(operations), passes, seconds * 1e3,
+                double(operations) / seconds * 1e-6, adaption.mesh().faceCount());
+}
+
+Criterion viewFrom(const Box3d& box, const Lattice& lattice, double turn, double distance,
+                   double pixels) {
+    Camera camera;
+    const double size = glm::length(box.max - box.min);
+    camera.target = (box.min + box.max) * 0.5;
+    camera.eye = camera.target + size * distance * Vec3d(std::cos(turn), std::sin(turn), 0.3);
+    return criterionOf(View(camera, {1920, 1080}, lattice), lattice, pixels);
+}
+
+void fly(Adaption& adaption, const Box3d& box, const Lattice& lattice, int jobs) {
+    double busy_seconds = 0;
+    uint64_t operations = 0;
+    std::vector<double> quiet_ns;
+    for (int frame = 0; frame < 300; ++frame) {
+        const double t = frame / 300.0;
+        const Criterion view = viewFrom(box, lattice, 2 * t, 0.4 + 2 * (1 - t) * (1 - t), 1);
+        const double begin = now();
+        const PassCounts counts = adaption.pass(view);
+        const double seconds = now() - begin;
+        busy_seconds += seconds;
+        operations += counts.operations();
+        if (counts.operations() * 1000 < adaption.mesh().vertexCount())
+            quiet_ns.push_back(seconds * 1e9 * jobs / double(adaption.mesh().vertexCount()));
     }
+    std::printf("  flight: %zu faces at its end, %.2f M operations/s\n",
+                adaption.mesh().faceCount(), double(operations) / busy_seconds * 1e-6);
+    if (quiet_ns.empty()) return;
+    std::sort(quiet_ns.begin(), quiet_ns.end());
+    std::printf("  %zu passes with under 0.1 %% of changes: median %.2f ns a vertex and core\n",
+                quiet_ns.size(), quiet_ns[quiet_ns.size() / 2]);
+}
+
+void hover(Adaption& adaption, const Box3d& box, const Lattice& lattice, int jobs) {
+    std::vector<double> ns;
+    uint64_t operations = 0;
+    adaption.settle(viewFrom(box, lattice, 2, 0.4, 1));
+    for (int frame = 0; frame < 100; ++frame) {
+        const Criterion view = viewFrom(box, lattice, 2 + 1e-5 * frame, 0.4, 1);
+        const double begin = now();
+        operations += adaption.pass(view).operations();
+        ns.push_back((now() - begin) * 1e9 * jobs / double(adaption.mesh().vertexCount()));
+    }
+    std::sort(ns.begin(), ns.end());
+    std::printf(
+        "  hover: %zu vertices, %.1f operations a frame: median %.2f, 90 %% %.2f ns a vertex"
+        " and core\n",
+        adaption.mesh().vertexCount(), double(operations) / 100, ns[50], ns[90]);
+}
+
+void run(const char* path, int jobs) {
+    Budget budget(size_t(8) << 30);
+    TempSpace space{"/tmp", &budget, size_t(1) << 30};
+    Progress progress;
+    const auto source = openSource({path});
+    WholeMesh whole = readWholeMesh(*source, path, {}, space, progress);
+    std::printf("%s: %zu triangles, lattice shift %d\n", path, whole.mesh.triangleCount(),
+                whole.lattice.shift);
+    Box3d box;
+    for (const Vec3i& p : whole.mesh.position) box.add(whole.lattice.toInput(p));
+    BuildCounts counts;
+    const double begin = now();
+    const ProgressiveMesh mesh = buildInCore(std::move(whole.mesh), whole.lattice, budget, &counts);
+    report(mesh, counts, now() - begin);
+    Adaption adaption(mesh);
+    for (int i = 0; i < 2; ++i) {
+        settle("refine all", adaption, criterionOf(-1.0, mesh.lattice));
+        settle("coarsen all", adaption, criterionOf(1e30, mesh.lattice));
+    }
+    fly(adaption, box, mesh.lattice, jobs);
+    hover(adaption, box, mesh.lattice, jobs);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    if (argc < 3) {
+        std::fprintf(stderr, "usage: bench_pmesh JOBS MESH...\n");
+        return 2;
+    }
+    const int jobs = std::atoi(argv[1]);
+    const ThreadLimit limit(jobs);
+    for (int i = 2; i < argc; ++i) run(argv[i], jobs);
 }

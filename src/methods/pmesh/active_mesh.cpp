@@ -14,7 +14,7 @@ constexpr auto kRelaxed = std::memory_order_relaxed;
 
 /// At most the radius that remains of the operation's sphere around its u.
 uint16_t radiusAroundU(const Operation& o) {
-    const Vec3d d(o.offset(1));
+    const Vec3d d(o.offset(o.isDummy() ? 0 : 1));
     const int64_t rest = int64_t(decodeRadius(o.radius)) - int64_t(std::sqrt(glm::dot(d, d))) - 1;
     if (rest <= 0) return 0;
     const uint32_t code = encodeRoundedUp<11>(uint64_t(rest));
@@ -59,7 +59,7 @@ void ActiveMesh::setLast(uint32_t v, OperationId last) {
     r.last = last;
     r.last_level =
         last == kNoOperation ? uint16_t(0) : uint16_t(source_->operation[last].level + 1);
-    const bool fresh = isFreshU(v);
+    const bool fresh = canUndo(v);
     criteria[v].merge_radius =
         fresh ? radiusAroundU(source_->operation[last]) : VertexCriteria::kEverNeeded;
     criteria[v].merge_error = fresh ? source_->operation[last].error : uint8_t(0);
@@ -83,6 +83,7 @@ bool ActiveMesh::readStar(uint32_t v, Star& star) const {
 }
 
 uint32_t ActiveMesh::partnerOf(uint32_t u) const {
+    if (source_->operation[record[u].last].isDummy()) return u;
     uint32_t v = kNoCorner;
     allNeighbours(u, [&](uint32_t w) {
         if (record[w].last == record[u].last) v = w;
@@ -96,10 +97,30 @@ void ActiveMesh::link(uint32_t half_edge, uint32_t other) {
     if (other != kNoCorner) twin[slotOf(other)] = half_edge;
 }
 
-/// The first corner of the open fan that has this one.
+/// The first corner of the fan that has this one, or this one where the fan is closed.
 uint32_t ActiveMesh::firstCorner(uint32_t corner) const {
-    for (uint32_t t; (t = twinOf(corner)) != kNoCorner;) corner = nextCorner(t);
-    return corner;
+    for (uint32_t c = corner;;) {
+        const uint32_t t = twinOf(c);
+        if (t == kNoCorner) return c;
+        c = nextCorner(t);
+        if (c == corner) return c;
+    }
+}
+
+void ActiveMesh::move(uint32_t v) {
+    const OperationId id = record[v].next;
+    const Operation& o = source_->operation[id];
+    vertex[v].moveBy(o.offset(0));
+    setLast(v, id);
+    setNext(v, o.child[0]);
+}
+
+void ActiveMesh::moveBack(uint32_t v) {
+    const OperationId id = record[v].last;
+    const Operation& o = source_->operation[id];
+    vertex[v].moveBy(-o.offset(0));
+    setLast(v, o.child[1]);
+    setNext(v, id);
 }
 
 void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t face) {

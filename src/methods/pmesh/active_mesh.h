@@ -88,17 +88,23 @@ public:
         return rank < star.count ? vertexAt(nextCorner(star.corner[rank]))
                                  : vertexAt(previousCorner(star.corner[star.count - 1]));
     }
-    /// `u` is as the split that made it left it.
-    bool isFreshU(uint32_t u) const {
-        return record[u].last != kNoOperation && record[u].name == source_->nameOf(record[u].last);
+    /// The operation that `u` came from last made it, or is a dummy: it is undone from here.
+    bool canUndo(uint32_t u) const {
+        const OperationId last = record[u].last;
+        return last != kNoOperation &&
+               (record[u].name == source_->nameOf(last) || source_->operation[last].isDummy());
     }
 
-    /// The v of the split that u came from: a neighbour of u, if both still are as that split left
-    /// them; else kNoCorner.
+    /// For a u that canUndo(): the v of its last operation, itself if that is a dummy; kNoCorner if
+    /// v has split again.
     uint32_t partnerOf(uint32_t u) const;
 
-    /// Performs the next split of v, whose star is `star`. u and the faces from `face` on, one for
-    /// each of the operation's ranks, are made; room for them must be there.
+    /// Performs the next operation of v, a dummy; undoes its last, one too.
+    void move(uint32_t v);
+    void moveBack(uint32_t v);
+
+    /// Performs the next split of v, no dummy, whose star is `star`. u and the faces from `face`
+    /// on, one for each of the operation's ranks, are made; room for them must be there.
     void split(uint32_t v, const Star& star, uint32_t u, uint32_t face);
 
     /// Undoes the split that made v and u of one. Returns the faces that are free now, kNoCorner

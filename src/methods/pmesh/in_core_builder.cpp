@@ -44,6 +44,12 @@ uint32_t lengthOf(const Vec3i& v) {
     return uint32_t(std::ceil(std::sqrt(glm::dot(d, d))));
 }
 
+/// Of an error in steps.
+uint8_t errorCode(double error) {
+    const uint64_t units = std::max<uint64_t>(uint64_t(std::ceil(error / kErrorUnit)), 1);
+    return uint8_t(std::min(encodeRoundedUp<3>(units), kMaxErrorCode));
+}
+
 class Encoder {
 public:
     Encoder(const Recorder& recorder, const SimplifyOutput& base, const Lattice& lattice,
@@ -57,11 +63,11 @@ public:
         mesh_.lattice = lattice;
     }
 
-    void run(bool saturated) {
+    void run() {
         makeBase();
         orderOperations();
         encodeStars();
-        if (saturated) saturate();
+        saturate();
     }
 
 private:
@@ -69,6 +75,7 @@ private:
     void orderOperations();
     void encodeStars();
     void encode(ActiveMesh& active, OperationId id, const CollapseRecord& r);
+    void encodeDummy(ActiveMesh& active, OperationId id, const CollapseRecord& r);
     void setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& from);
     void saturate();
 
@@ -85,7 +92,8 @@ void Encoder::makeBase() {
     const Mesh& base = base_.mesh;
     mesh_.base_vertex.resize(base.vertexCount());
     mesh_.base_triangle = base.triangle;
-    for (const CollapseRecord& r : recorder_.records()) slot_of_[r.u] = 0;  // gone
+    for (const CollapseRecord& r : recorder_.records())
+        if (r.u != kNoVertex) slot_of_[r.u] = 0;  // gone
     for (uint32_t v = 0; v < slot_of_.size(); ++v) {
         const uint32_t slot = slot_of_[v] == 0 ? kNoVertex : base_.vertex_map[v];
         slot_of_[v] = slot;
@@ -115,7 +123,14 @@ void Encoder::orderOperations() {
         o.level = uint16_t(recorder_.largestHeight() - r.height);
         o.normal = r.normal;
         o.radius = o.error = 0;
+        o.ranks = r.u == kNoVertex ? Operation::kDummyRanks : uint8_t(0);
     }
+    for (OperationId id = 0; id < order_.size(); ++id)
+        for (const int end : {0, 1}) {
+            const OperationId child = mesh_.operation[id].childOf(end);
+            if (child != kNoOperation && mesh_.operation[child].isDummy())
+                mesh_.operation[child].child[1] = id;
+        }
     mesh_.base_operation.assign(mesh_.base_vertex.size(), kNoOperation);
     for (uint32_t v = 0; v < slot_of_.size(); ++v)
         if (slot_of_[v] != kNoVertex) mesh_.base_operation[slot_of_[v]] = idOf(recorder_.lastOf(v));
@@ -126,14 +141,39 @@ void Encoder::encodeStars() {
     const size_t count = mesh_.operation.size();
     active.resize(active.vertexCount() + count, active.faceCount() + 2 * count);
     active.resize(mesh_.base_vertex.size(), mesh_.base_triangle.size());
-    for (OperationId id = 0; id < count; ++id) encode(active, id, recorder_.records()[order_[id]]);
+    for (OperationId id = 0; id < count; ++id) {
+        const CollapseRecord& r = recorder_.records()[order_[id]];
+        CHECK_EQ(active.record[slot_of_[r.v]].next, id);
+        if (r.u == kNoVertex) {
+            encodeDummy(active, id, r);
+        } else {
+            encode(active, id, r);
+        }
+    }
+    counts_.name_of = slot_of_;
+    for (uint32_t& name : counts_.name_of)
+        if (name != kNoVertex) name = active.record[name].name;
+}
+
+/// Moves v to where it is to be, as far as sixteen bits reach.
+void Encoder::encodeDummy(ActiveMesh& active, OperationId id, const CollapseRecord& r) {
+    Operation& o = mesh_.operation[id];
+    const uint32_t v = slot_of_[r.v];
+    const Vec3i offset = glm::clamp(r.position[0] - active.vertex[v].position(), -32768, 32767);
+    o.shift = 0;
+    for (int k = 0; k < 3; ++k) {
+        o.delta[0][size_t(k)] = int8_t(offset[k] >> 8);
+        o.delta[1][size_t(k)] = int8_t(offset[k] & 0xff);
+    }
+    o.radius = uint16_t(encodeRoundedUp<11>(lengthOf(offset)));
+    o.error = errorCode(lengthOf(offset));
+    active.move(v);
 }
 
 void Encoder::encode(ActiveMesh& active, OperationId id, const CollapseRecord& r) {
     Operation& o = mesh_.operation[id];
     const uint32_t v = slot_of_[r.v], u = uint32_t(active.vertexCount());
     Star star;
-    CHECK_EQ(active.record[v].next, id);
     CHECK(active.readStar(v, star));
     uint32_t left = kNoRank, right = kNoRank, radius = 0;
     const Vec3i from = active.vertex[v].position();
@@ -149,8 +189,7 @@ void Encoder::encode(ActiveMesh& active, OperationId id, const CollapseRecord& r
     setOffsets(o, r, from);
     radius = std::max({radius, lengthOf(o.offset(0)), lengthOf(o.offset(1))});
     o.radius = uint16_t(encodeRoundedUp<11>(radius));
-    const double error = std::ceil(double(r.deviation) / (kErrorUnit * double(1 << shift_)));
-    o.error = uint8_t(std::min(encodeRoundedUp<3>(uint64_t(error)), kMaxErrorCode));
+    o.error = errorCode(double(r.deviation) / double(1 << shift_));
     const uint32_t face = uint32_t(active.faceCount());
     active.resize(u + 1, face + (left != kNoRank) + (right != kNoRank));
     active.split(v, star, u, face);
@@ -176,8 +215,8 @@ void Encoder::saturate() {
         Operation& o = mesh_.operation[i];
         uint32_t radius = decodeRadius(o.radius);
         for (const int end : {0, 1}) {
-            if (o.child[size_t(end)] == kNoOperation) continue;
-            const Operation& child = mesh_.operation[o.child[size_t(end)]];
+            if (o.childOf(end) == kNoOperation) continue;
+            const Operation& child = mesh_.operation[o.childOf(end)];
             o.error = std::max(o.error, child.error);
             radius = std::max(radius, lengthOf(o.offset(end)) + decodeRadius(child.radius));
         }
@@ -189,8 +228,8 @@ void Encoder::saturate() {
 
 }  // namespace
 
-ProgressiveMesh buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget, BuildCounts* counts,
-                            bool saturate) {
+ProgressiveMesh buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
+                            BuildCounts* counts) {
     const Reservation memory =
         budget.reserve(kBuildBytes * mesh.triangleCount(), "a progressive mesh, built in memory,");
     BuildCounts unused;
@@ -207,7 +246,8 @@ ProgressiveMesh buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget, B
     const SimplifyOutput base = collapseAll(mesh, lattice.shift, recorder);
     c.refused = recorder.refused();
     c.levels = recorder.largestHeight();
-    Encoder(recorder, base, lattice, mesh.vertexCount(), result, c).run(saturate);
+    c.dummies = recorder.dummies();
+    Encoder(recorder, base, lattice, mesh.vertexCount(), result, c).run();
     return result;
 }
 

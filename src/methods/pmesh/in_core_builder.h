@@ -19,13 +19,15 @@ struct BuildCounts {
     uint64_t irregular_vertices = 0;  ///< locked: ends of non-manifold edges, bow-ties
     Recorder::Refused refused;
     uint32_t levels = 0;
+    uint64_t dummies = 0;
     uint64_t inexact_ends = 0;  ///< vertices that the offsets do not give exactly, when they appear
-    uint32_t largest_error = 0;  ///< of these, in steps along an axis
+    uint32_t largest_error = 0;     ///< of these, in steps along an axis
+    std::vector<uint32_t> name_of;  ///< one an input vertex, kNoVertex for those without triangles
 };
 
 /// `mesh`: welded, without degenerate or doubled triangles, with normals, all positions multiples
-/// of 2^lattice.shift; its edge classes are set here. `saturate`: only a test says no.
+/// of 2^lattice.shift; its edge classes are set here.
 ProgressiveMesh buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
-                            BuildCounts* counts = nullptr, bool saturate = true);
+                            BuildCounts* counts = nullptr);
 
 }  // namespace pietra::pmesh

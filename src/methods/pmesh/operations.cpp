@@ -17,9 +17,9 @@ std::string faultOf(const Operation& o) {
     if (o.level > kMaxLevel)
         return fmt::format("its level is {}, the largest is {}", o.level, kMaxLevel);
     if (o.radius > kMaxRadiusCode) return fmt::format("its radius has the code {}", o.radius);
+    if (o.error == 0) return "its error has the code 0";
     if (o.shift > 20) return fmt::format("its deltas are shifted by {}", o.shift);
-    if (o.rankLeft() == kNoRank && o.rankRight() == kNoRank) return "it has no neighbours";
-    if (o.rankLeft() == o.rankRight()) return "its neighbours have equal ranks";
+    if (o.rankLeft() == o.rankRight() && !o.isDummy()) return "its neighbours have equal ranks";
     return "";
 }
 
@@ -37,16 +37,20 @@ std::string validate(const ProgressiveMesh& mesh) {
     for (const OperationId o : mesh.base_operation) {
         if (o == kNoOperation) continue;
         if (o >= count || has_parent[o]++) return fmt::format("operation {}: not a tree", o);
+        if (mesh.operation[o].isDummy() && mesh.operation[o].child[1] != kNoOperation)
+            return fmt::format("operation {}: it does not know its parent", o);
     }
     for (size_t o = 0; o < count; ++o) {
         const Operation& op = mesh.operation[o];
         if (const std::string fault = faultOf(op); !fault.empty())
             return fmt::format("operation {}: {}", o, fault);
         for (const int end : {0, 1}) {
-            const OperationId c = op.child[size_t(end)];
+            const OperationId c = op.childOf(end);
             if (c == kNoOperation) continue;
             if (c <= o || c >= count || has_parent[c]++)
                 return fmt::format("operation {}: not a tree", c);
+            if (mesh.operation[c].isDummy() && mesh.operation[c].child[1] != o)
+                return fmt::format("operation {}: it does not know its parent", c);
             if (mesh.operation[c].level <= op.level)
                 return fmt::format("operation {}: its level is not above its parent's", c);
             if (!criteriaNest(op, mesh.operation[c], end))

@@ -21,6 +21,9 @@
 // name, or at a border from its beginning. In an oriented fan the paper's sixteen flag bits follow
 // from these two ranks.
 //
+// A dummy operation has no u: it moves v by an offset of sixteen bits, where those of the operation
+// before were too coarse for the edges around.
+//
 // All positions are integers, in *steps* of 2^Lattice::shift, so that a collapse undoes its split
 // exactly. Criteria are saturated: an operation's error is no less, and its sphere encloses those,
 // of the operations below it, also after rounding.
@@ -91,20 +94,34 @@ constexpr OctNormal unpackNormal(uint32_t packed) {
 // ---- operations
 
 struct Operation {
-    std::array<OperationId, 2> child;  ///< the next splits of v and of u, kNoOperation: none
-    uint16_t level;                    ///< at most kMaxLevel, below the children's
-    uint16_t radius;                   ///< of the saturated sphere around the unsplit vertex
-    uint8_t error;                     ///< saturated
-    uint8_t ranks;                     ///< of vl in the lower, of vr in the upper four bits
-    uint8_t shift;                     ///< of the deltas
+    /// The next splits of v and of u, kNoOperation: none. Of a dummy: that of v, and the operation
+    /// that v came from, which elsewhere u remembers.
+    std::array<OperationId, 2> child;
+    uint16_t level;   ///< at most kMaxLevel, below the children's
+    uint16_t radius;  ///< of the saturated sphere around the unsplit vertex
+    uint8_t error;    ///< saturated; 0 would mean that there is no operation
+    uint8_t ranks;    ///< of vl in the lower, of vr in the upper four bits
+    uint8_t shift;    ///< of the deltas
     std::array<std::array<int8_t, 3>, 2> delta;  ///< from the unsplit vertex to v, to u: << shift
     std::array<uint16_t, 2> normal;              ///< of v and of u after the split
 
     uint32_t rankLeft() const { return ranks & 15u; }
     uint32_t rankRight() const { return ranks >> 4; }
+    static constexpr uint8_t kDummyRanks = kNoRank | kNoRank << 4;
+    bool isDummy() const { return ranks == kDummyRanks; }
+    OperationId childOf(int end) const {
+        return end == 1 && isDummy() ? kNoOperation : child[size_t(end)];
+    }
+    /// From the unsplit vertex to v (0) or u (1), in steps.
     Vec3i offset(int end) const {
         const auto& d = delta[size_t(end)];
+        if (isDummy()) return wideOffset();
         return Vec3i(d[0], d[1], d[2]) * (1 << shift);
+    }
+    /// Of a dummy: the upper bytes first.
+    Vec3i wideOffset() const {
+        const auto wide = [&](size_t k) { return delta[0][k] * 256 + uint8_t(delta[1][k]); };
+        return Vec3i(wide(0), wide(1), wide(2)) * (1 << shift);
     }
 };
 static_assert(sizeof(Operation) == 28);

@@ -10,7 +10,7 @@ namespace {
 
 /// A coordinate is off by half of 2^shift at most; that may be so large a part of the shortest
 /// edge.
-constexpr float kMostImprecise = 1e9f;
+constexpr float kMostImprecise = 1.0f / 8;
 
 }  // namespace
 
@@ -39,26 +39,54 @@ Vec3i Recorder::stepsOf(const WorkingMesh& mesh, const Vec3f& p) const {
     return (mesh.centre + Vec3i(p)) >> shift_;
 }
 
-uint32_t Recorder::heightAround(const CollapseStep& step) const {
-    uint32_t highest = std::max(heightOf(step.u), heightOf(step.v));
-    for (uint32_t i = 0; i < step.ring.size; ++i)
-        highest = std::max({highest, heightOf(step.ring.next[i]), heightOf(step.ring.previous[i])});
-    return highest;
+namespace {
+
+/// body(a, b) for each edge of the step's two ends, some twice.
+template <class Body>
+void forEdges(const CollapseStep& step, Body&& body) {
+    body(step.u, step.v);
+    for (uint32_t i = 0; i < step.ring.size; ++i) {
+        body(step.ring.apex[i], step.ring.next[i]);
+        body(step.ring.apex[i], step.ring.previous[i]);
+    }
+    for (const Wing& w : step.wing) {
+        body(step.u, w.vertex);
+        body(step.v, w.vertex);
+    }
 }
 
-bool Recorder::isPrecise(const CollapseStep& step, const std::array<Vec3i, 2>& offset) const {
-    const uint32_t shift = quantiseOffsets(offset).shift;
-    if (shift == 0) return true;
-    const auto length_sq = [&](uint32_t a, uint32_t b) {
+}  // namespace
+
+/// How far off, in lattice units along an axis, this end may come.
+float Recorder::precisionAt(const CollapseStep& step, uint32_t end) const {
+    float shortest_sq = HUGE_VALF;
+    forEdges(step, [&](uint32_t a, uint32_t b) {
         const Vec3f d = step.mesh.point[a].vec() - step.mesh.point[b].vec();
-        return glm::dot(d, d);
-    };
-    float shortest_sq = length_sq(step.u, step.v);
-    for (uint32_t i = 0; i < step.ring.size; ++i)
-        shortest_sq = std::min({shortest_sq, length_sq(step.ring.apex[i], step.ring.next[i]),
-                                length_sq(step.ring.apex[i], step.ring.previous[i])});
-    const float limit = kMostImprecise * std::sqrt(shortest_sq);
-    return float(1u << shift) / 2 * float(1 << shift_) <= limit;
+        if (a == end || b == end) shortest_sq = std::min(shortest_sq, glm::dot(d, d));
+    });
+    return kMostImprecise * std::sqrt(shortest_sq);
+}
+
+void Recorder::push(const CollapseRecord& record) {
+    largest_ = std::max(largest_, record.height);
+    last_[record.v] = uint32_t(record_.size());
+    record_.push_back(record);
+}
+
+void Recorder::recordDummy(const CollapseStep& step, uint32_t end) {
+    CollapseRecord r;
+    r.v = end;
+    r.position[0] = stepsOf(step.mesh, step.mesh.point[end].vec());
+    r.normal[0] = packNormal(normal_[end]);
+    r.child = {last_[end], kNoOperation};
+    r.height = 0;
+    forEdges(step, [&](uint32_t a, uint32_t b) {
+        if (a == end || b == end) r.height = std::max({r.height, heightOf(a), heightOf(b)});
+    });
+    ++r.height;
+    r.deviation = 0;
+    ++dummies_;
+    push(r);
 }
 
 bool Recorder::take(const CollapseStep& step) {
@@ -68,6 +96,11 @@ bool Recorder::take(const CollapseStep& step) {
         step.mesh.point[u].rank() != kRankFree || step.mesh.point[v].rank() != kRankFree;
     if (step.ring.size + open > kMaxNeighbours) return ++refused_.valence, false;
     CHECK_EQ(step.wing.size() + (open && step.wing.size() == 1), size_t(2));
+    uint32_t highest = 0;
+    forEdges(step, [&](uint32_t a, uint32_t b) {
+        highest = std::max({highest, heightOf(a), heightOf(b)});
+    });
+    if (highest + 3 > kMaxLevel + 1) return ++refused_.level, false;  // two dummies and itself
 
     CollapseRecord r;
     r.v = v, r.u = u;
@@ -79,17 +112,16 @@ bool Recorder::take(const CollapseStep& step) {
     const Vec3i to = stepsOf(step.mesh, step.to);
     r.position = {stepsOf(step.mesh, step.mesh.point[v].vec()),
                   stepsOf(step.mesh, step.mesh.point[u].vec())};
-    if (!isPrecise(step, {r.position[0] - to, r.position[1] - to}))
-        return ++refused_.imprecise, false;
-    r.height = heightAround(step) + 1;
-    if (r.height > kMaxLevel + 1) return ++refused_.level, false;
-    largest_ = std::max(largest_, r.height);
+    const uint32_t shift = quantiseOffsets({r.position[0] - to, r.position[1] - to}).shift;
+    const float lost = shift == 0 ? 0 : float(1 << (shift - 1)) * float(1 << shift_);
+    for (const uint32_t end : {v, u})
+        if (lost > 0 && lost > precisionAt(step, end)) recordDummy(step, end);
+    r.height = 1 + std::max({highest, heightOf(u), heightOf(v)});
     r.normal = {packNormal(normal_[v]), packNormal(normal_[u])};
     r.child = {last_[v], last_[u]};
     r.deviation = step.deviation;
     normal_[v] = encodeNormal(decodeNormal(normal_[v]) + decodeNormal(normal_[u]));
-    last_[v] = uint32_t(record_.size());
-    record_.push_back(r);
+    push(r);
     return true;
 }
 

@@ -2,10 +2,9 @@
 // Writes down every collapse of the simplifier as the vertex split that undoes it, and forbids
 // those that no split could undo:
 //   - of irregular vertices (non-manifold edges, bow-ties): locked, they stay in the base mesh;
-//   - of stars with more neighbours than ranks can tell;
-//   - of edges so long beside others around them that eight bits a coordinate would not do. The
-//     paper inserts dummy splits there, with levels of their own; forbidding costs nothing on real
-//     meshes (README.md).
+//   - of stars with more neighbours than ranks can tell.
+// Where an edge is so long beside others around it that eight bits a coordinate would not do, its
+// ends are first moved by dummy operations.
 //
 // Heights are levels counted from the fine side: one more than the largest height around. So they
 // are known while collapsing, whatever comes later and elsewhere.
@@ -22,9 +21,10 @@ namespace pietra::pmesh {
 
 inline constexpr uint32_t kNoVertex = ~0u;
 
-/// Vertices are those of the mesh that is simplified; positions in steps.
+/// A dummy has no u, left and right. Vertices are those of the mesh that is simplified; positions
+/// in steps.
 struct CollapseRecord {
-    uint32_t v, u;
+    uint32_t v, u = kNoVertex;
     uint32_t left = kNoVertex, right = kNoVertex;
     std::array<Vec3i, 2> position;   ///< of v and of u, before
     std::array<uint16_t, 2> normal;  ///< the same
@@ -43,7 +43,7 @@ QuantisedOffsets quantiseOffsets(const std::array<Vec3i, 2>& offset);
 class Recorder : public CollapseSink {
 public:
     struct Refused {
-        uint64_t irregular = 0, valence = 0, imprecise = 0, level = 0;
+        uint64_t irregular = 0, valence = 0, level = 0;
     };
 
     /// `mesh`: the one that is simplified; `irregular`: one a vertex, as HalfEdges has it; both
@@ -54,6 +54,7 @@ public:
 
     const std::vector<CollapseRecord>& records() const { return record_; }
     uint32_t largestHeight() const { return largest_; }
+    uint64_t dummies() const { return dummies_; }
     /// Attempts, not edges: an edge may be tried again.
     const Refused& refused() const { return refused_; }
     /// The record of the last collapse into v, or kNoOperation.
@@ -61,11 +62,12 @@ public:
     OctNormal normalOf(uint32_t v) const { return normal_[v]; }
 
 private:
-    bool isPrecise(const CollapseStep& step, const std::array<Vec3i, 2>& offset) const;
+    float precisionAt(const CollapseStep& step, uint32_t end) const;
+    void recordDummy(const CollapseStep& step, uint32_t end);
+    void push(const CollapseRecord& record);
     uint32_t heightOf(uint32_t v) const {
         return last_[v] == kNoOperation ? 0 : record_[last_[v]].height;
     }
-    uint32_t heightAround(const CollapseStep& step) const;
     Vec3i stepsOf(const WorkingMesh& mesh, const Vec3f& p) const;
 
     std::span<const uint8_t> irregular_;
@@ -74,6 +76,7 @@ private:
     std::vector<uint32_t> last_;
     std::vector<CollapseRecord> record_;
     uint32_t largest_ = 0;
+    uint64_t dummies_ = 0;
     Refused refused_;
 };
 

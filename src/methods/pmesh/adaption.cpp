@@ -1,0 +1,208 @@
+#include "methods/pmesh/adaption.h"
+
+#include <algorithm>
+#include <atomic>
+#include <bit>
+#include <cstring>
+
+#include "base/check.h"
+#include "base/parallel.h"
+
+namespace pietra::pmesh {
+namespace {
+
+enum State : uint8_t {
+    kMarked = 1,  ///< needed, or needed by a neighbour
+    kFresh0 = 2,  ///< marked, not looked at yet: in rounds of even, of odd number
+    kFresh1 = 4,
+    kMaySplit = 8,
+    kMayUndo = 16,  ///< its last operation is not needed
+};
+constexpr size_t kBlockVertices = 4096;
+constexpr size_t kGrain = 256;  // operations
+constexpr auto kRelaxed = std::memory_order_relaxed;
+
+/// body(v) for each v of [begin, end) whose state has one of these bits, in order.
+template <class Body>
+void forStates(std::vector<uint64_t>& states, size_t begin, size_t end, uint8_t bits, Body&& body) {
+    const uint64_t mask = 0x0101010101010101u * bits;
+    for (size_t word = begin / 8; word < (end + 7) / 8; ++word) {
+        uint64_t found = std::atomic_ref(states[word]).load(kRelaxed) & mask;
+        while (found != 0) {
+            const int k = std::countr_zero(found) / 8;
+            body(uint32_t(8 * word + size_t(k)));
+            found &= ~(uint64_t(0xff) << (8 * k));
+        }
+    }
+}
+
+}  // namespace
+
+/// Calls body(block, begin, end) for all blocks, in parallel.
+template <class Body>
+void Adaption::forBlocks(Body&& body) {
+    const size_t count = mesh_.vertexCount();
+    parallelFor(block_.size(), [&](size_t b) {
+        const size_t begin = b * kBlockVertices;
+        body(block_[b], begin, std::min(begin + kBlockVertices, count));
+    });
+}
+
+PassCounts Adaption::pass(const Criterion& criterion) {
+    mark(criterion);
+    for (uint32_t round = 0; isFresh(round); round ^= 1) force(round);
+    findMerges(criterion);
+    listWork();
+    applyWork();
+    return {uint32_t(split_.size()), uint32_t(merge_.size())};
+}
+
+int Adaption::settle(const Criterion& criterion) {
+    int passes = 1;
+    while (pass(criterion).operations() > 0) ++passes;
+    return passes;
+}
+
+void Adaption::mark(const Criterion& criterion) {
+    block_.resize((mesh_.vertexCount() + kBlockVertices - 1) / kBlockVertices);
+    states_.resize((mesh_.vertexCount() + 7) / 8);
+    forBlocks([&](Block& block, size_t begin, size_t end) {
+        uint64_t any = 0;
+        for (size_t v = begin; v < end; v += 8) {
+            uint64_t eight = 0;
+            for (size_t k = 0; k < std::min<size_t>(8, end - v); ++k) {
+                const Vertex& vertex = mesh_.vertex[v + k];
+                const VertexCriteria& criteria = mesh_.criteria[v + k];
+                const uint64_t marked =
+                    criterion.needsSplit(vertex, criteria) ? kMarked | kFresh0 : 0;
+                const uint64_t undo = criterion.needsLast(vertex, criteria) ? 0 : kMayUndo;
+                eight |= (marked | undo) << (8 * k);
+            }
+            states_[v / 8] = eight;
+            any |= eight;
+        }
+        constexpr uint64_t kEach = 0x0101010101010101u;
+        block.fresh = {(any & kEach * kFresh0) != 0, false};
+        block.may_undo = (any & kEach * kMayUndo) != 0;
+        block.may_split = false;
+        block.merge.clear();
+    });
+}
+
+bool Adaption::isFresh(uint32_t round) const {
+    return std::any_of(block_.begin(), block_.end(),
+                       [&](const Block& block) { return block.fresh[round]; });
+}
+
+void Adaption::force(uint32_t round) {
+    forBlocks([&](Block& block, size_t begin, size_t end) {
+        if (!block.fresh[round]) return;
+        block.fresh[round] = false;
+        forStates(states_, begin, end, round == 0 ? kFresh0 : kFresh1,
+                  [&](uint32_t v) { visitMarked(v, round); });
+    });
+}
+
+/// A marked vertex may split, or marks those that must before it.
+void Adaption::visitMarked(uint32_t v, uint32_t round) {
+    const uint8_t fresh = round == 0 ? kFresh0 : kFresh1, next = kFresh0 ^ kFresh1 ^ fresh;
+    clearState(v, fresh);
+    const uint16_t level = mesh_.record[v].next_level;
+    bool is_lowest = true;
+    mesh_.allNeighbours(v, [&](uint32_t w) {
+        const uint16_t other = mesh_.record[w].next_level;
+        DCHECK(other != level || level == kLeafLevel);
+        if (other >= level) return true;
+        is_lowest = false;
+        if (stateOf(w) & kMarked) return true;
+        setState(w, kMarked | next);
+        std::atomic_ref(block_[w / kBlockVertices].fresh[round ^ 1]).store(true, kRelaxed);
+        return true;
+    });
+    if (!is_lowest) return;
+    setState(v, kMaySplit);
+    block_[v / kBlockVertices].may_split = true;
+}
+
+void Adaption::findMerges(const Criterion& criterion) {
+    forBlocks([&](Block& block, size_t begin, size_t end) {
+        if (!block.may_undo) return;
+        forStates(states_, begin, end, kMayUndo, [&](uint32_t u) {
+            if (uint32_t v; mayMerge(u, criterion, v)) block.merge.push_back({v, u});
+        });
+    });
+}
+
+bool Adaption::mayMerge(uint32_t u, const Criterion& criterion, uint32_t& v) const {
+    const uint16_t level = mesh_.record[u].last_level;
+    const OperationId id = mesh_.record[u].last;
+    const Operation& o = mesh_.source().operation[id];
+    v = o.isDummy() ? u : kNoCorner;
+    const auto allows = [&](uint32_t w) {
+        if (w == u || w == v) return true;
+        if (mesh_.record[w].last == id) return v = w, true;
+        return !(stateOf(w) & kMarked) && mesh_.record[w].last_level < level;
+    };
+    if ((stateOf(u) & kMarked) || !mesh_.allNeighbours(u, allows)) return false;
+    if (v == kNoCorner || (stateOf(v) & kMarked) || !mesh_.allNeighbours(v, allows)) return false;
+    return !criterion.needs(mesh_.vertex[v].position() - o.offset(0), o.error, o.radius);
+}
+
+/// The work of all blocks in the order of the vertices, with places for what is new.
+void Adaption::listWork() {
+    split_.clear();
+    merge_.clear();
+    uint32_t u = uint32_t(mesh_.vertexCount()), face = uint32_t(mesh_.faceCount());
+    for (size_t b = 0; b < block_.size(); ++b) {
+        const Block& block = block_[b];
+        merge_.insert(merge_.end(), block.merge.begin(), block.merge.end());
+        if (!block.may_split) continue;
+        const size_t begin = b * kBlockVertices;
+        const size_t end = std::min(begin + kBlockVertices, mesh_.vertexCount());
+        forStates(states_, begin, end, kMaySplit, [&](uint32_t v) {
+            const Operation& o = mesh_.source().operation[mesh_.record[v].next];
+            split_.push_back({v, u, face});
+            if (o.isDummy()) return;
+            ++u;
+            face += (o.rankLeft() != kNoRank) + (o.rankRight() != kNoRank);
+        });
+    }
+    mesh_.resize(u, face);
+}
+
+void Adaption::applyWork() {
+    parallelForSlices(split_.size(), kGrain, [&](size_t begin, size_t end) {
+        Star star;
+        for (size_t i = begin; i < end; ++i) {
+            const Split& s = split_[i];
+            if (mesh_.source().operation[mesh_.record[s.v].next].isDummy()) {
+                mesh_.move(s.v);
+            } else {
+                CHECK(mesh_.readStar(s.v, star));
+                mesh_.split(s.v, star, s.u, s.face);
+            }
+        }
+    });
+    if (merge_.empty()) return;
+    free_vertex_.resize(merge_.size());
+    free_face_.resize(2 * merge_.size());
+    parallelForSlices(merge_.size(), kGrain, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i) {
+            const auto [v, u] = merge_[i];
+            std::array<uint32_t, 2> faces{kNoCorner, kNoCorner};
+            if (u == v) {
+                mesh_.moveBack(v);
+            } else {
+                faces = mesh_.merge(v, u);
+            }
+            free_vertex_[i] = u == v ? kNoCorner : u;
+            free_face_[2 * i] = faces[0];
+            free_face_[2 * i + 1] = faces[1];
+        }
+    });
+    std::erase(free_vertex_, kNoCorner);
+    std::erase(free_face_, kNoCorner);
+    mesh_.fillHoles(free_vertex_, free_face_);
+}
+
+}  // namespace pietra::pmesh

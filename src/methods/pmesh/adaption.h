@@ -1,0 +1,91 @@
+#pragma once
+// Parallel adaption (Derzapf et al. 2011, section 4.2): passes over the active mesh, each of which
+// applies all operations that may be applied at once.
+//
+// A pass, from the state before it:
+//   1. Mark every vertex whose next operation the criterion needs.
+//   2. A marked vertex with a neighbour of a lower level cannot be next: mark that neighbour; so
+//   on,
+//      in rounds over those newly marked, until there are none. One without may split.
+//   3. An operation that is not needed may be undone if it is the last of both its vertices, and no
+//      other neighbour's last one has its level or a higher one. Where both meet, splits win: no
+//      vertex around may be marked.
+//   4. Prefix sums give new vertices and faces their places; all splits and merges are done.
+//   5. The last elements move into the places that merges left.
+//
+// The set of operations applied when nothing is left to do is the least one that holds all that is
+// needed and is closed under dependency: it depends on the criterion alone, not on what was before.
+//
+// The arrays after each pass are the same for any number of threads. A pass with nothing to do
+// reads 24 bytes a vertex. Not thread-safe.
+
+#include <cstdint>
+#include <vector>
+
+#include "methods/pmesh/active_mesh.h"
+#include "methods/pmesh/criterion.h"
+
+namespace pietra::pmesh {
+
+struct PassCounts {
+    uint32_t splits = 0, merges = 0;  ///< dummies included
+    uint32_t operations() const { return splits + merges; }
+};
+
+class Adaption {
+public:
+    /// `mesh` must outlive this; validate() must find no fault in it.
+    explicit Adaption(const ProgressiveMesh& mesh) : mesh_(mesh) {}
+
+    PassCounts pass(const Criterion& criterion);
+    /// Passes until nothing is left to do. Returns their number.
+    int settle(const Criterion& criterion);
+
+    const ActiveMesh& mesh() const { return mesh_; }
+
+private:
+    struct Split {
+        uint32_t v, u, face;
+    };
+    struct Merge {
+        uint32_t v, u;
+    };
+    /// What a block of consecutive vertices has to do.
+    struct Block {
+        std::array<bool, 2> fresh{};  ///< some vertex is marked and not looked at yet
+        bool may_split = false, may_undo = false;
+        std::vector<Merge> merge;
+    };
+
+    template <class Body>
+    void forBlocks(Body&& body);
+    uint8_t stateOf(uint32_t v) const {
+        return uint8_t(std::atomic_ref(const_cast<uint64_t&>(states_[v / 8]))
+                           .load(std::memory_order_relaxed) >>
+                       (8 * (v % 8)));
+    }
+    void setState(uint32_t v, uint64_t bits) {
+        std::atomic_ref(states_[v / 8]).fetch_or(bits << (8 * (v % 8)), std::memory_order_relaxed);
+    }
+    void clearState(uint32_t v, uint64_t bits) {
+        std::atomic_ref(states_[v / 8])
+            .fetch_and(~(bits << (8 * (v % 8))), std::memory_order_relaxed);
+    }
+    void mark(const Criterion& criterion);
+    bool isFresh(uint32_t round) const;
+    void force(uint32_t round);
+    void visitMarked(uint32_t v, uint32_t round);
+    void findMerges(const Criterion& criterion);
+    bool mayMerge(uint32_t u, const Criterion& criterion, uint32_t& v) const;
+    void listWork();
+    void applyWork();
+
+    ActiveMesh mesh_;
+    std::vector<uint64_t> states_;  ///< eight vertices a word
+    std::vector<Block> block_;
+    std::vector<Split> split_;
+    std::vector<Merge> merge_;
+    std::vector<uint32_t> free_vertex_, free_face_;
+};
+
+}  // namespace pietra::pmesh

@@ -1,0 +1,206 @@
+// Adaption: what passes do to the mesh, against what must come out.
+
+#include "methods/pmesh/adaption.h"
+
+#include <filesystem>
+
+#include "base/parallel.h"
+#include "methods/pmesh/pmesh_testing.h"
+#include "methods/pmesh/whole_mesh.h"
+
+namespace pietra::pmesh {
+namespace {
+
+class Adapted : public testing::TestWithParam<TestMesh> {};
+INSTANTIATE_TEST_SUITE_P(Pmesh, Adapted, testing::ValuesIn(testMeshes()),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+/// The dependencies of each operation, spelt out one by one, as Xia and Varshney have them: before
+/// it, all that made its star. And where the vertex that it splits lies.
+struct Reference {
+    std::vector<std::vector<OperationId>> needs;
+    std::vector<Vec3i> centre;
+
+    explicit Reference(const ProgressiveMesh& source) {
+        ActiveMesh mesh(source);
+        std::map<OperationId, uint32_t> waiting;
+        const auto wait = [&](uint32_t v) {
+            if (mesh.record[v].next != kNoOperation) waiting[mesh.record[v].next] = v;
+        };
+        for (uint32_t v = 0; v < mesh.vertexCount(); ++v) wait(v);
+        for (OperationId id = 0; id < source.operation.size(); ++id) {
+            const uint32_t v = waiting.at(id);
+            needs.emplace_back();
+            const auto need = [&](uint32_t w) {
+                if (mesh.record[w].last != kNoOperation)
+                    needs.back().push_back(mesh.record[w].last);
+                return true;
+            };
+            need(v);
+            mesh.allNeighbours(v, need);
+            centre.push_back(mesh.vertex[v].position());
+            apply(mesh, v);
+            wait(v);
+            if (!source.operation[id].isDummy()) wait(uint32_t(mesh.vertexCount() - 1));
+        }
+    }
+
+    static void apply(ActiveMesh& mesh, uint32_t v) {
+        const Operation& o = mesh.source().operation[mesh.record[v].next];
+        if (o.isDummy()) return mesh.move(v);
+        Star star;
+        ASSERT_TRUE(mesh.readStar(v, star));
+        const size_t u = mesh.vertexCount(), face = mesh.faceCount();
+        mesh.resize(u + 1, face + (o.rankLeft() != kNoRank) + (o.rankRight() != kNoRank));
+        mesh.split(v, star, uint32_t(u), uint32_t(face));
+    }
+
+    std::vector<uint8_t> closure(const ProgressiveMesh& source, const Criterion& criterion) const {
+        std::vector<uint8_t> in(needs.size(), 0);
+        for (size_t o = needs.size(); o-- > 0;) {
+            const Operation& op = source.operation[o];
+            in[o] |= criterion.needs(centre[o], op.error, op.radius);
+            if (in[o])
+                for (const OperationId d : needs[o]) in[d] = 1;
+        }
+        return in;
+    }
+};
+
+std::vector<uint8_t> applied(const ActiveMesh& mesh) {
+    const std::vector<Operation>& operation = mesh.source().operation;
+    std::vector<OperationId> parent(operation.size(), kNoOperation);
+    for (OperationId o = 0; o < operation.size(); ++o)
+        for (const int end : {0, 1})
+            if (operation[o].childOf(end) != kNoOperation) parent[operation[o].childOf(end)] = o;
+    std::vector<uint8_t> in(operation.size(), 0);
+    for (const VertexRecord& r : mesh.record)
+        for (OperationId o = r.last; o != kNoOperation && !in[o]; o = parent[o]) in[o] = 1;
+    return in;
+}
+
+TEST_P(Adapted, IsTheClosureOfWhatIsNeededWhateverWasBefore) {
+    const Built built = buildFor(GetParam().make());
+    const Reference reference(built.mesh);
+    std::mt19937 random(11);
+    Adaption walker(built.mesh), coarse(built.mesh), fine(built.mesh);
+    for (int i = 0; i < 12; ++i) {
+        const Criterion view = randomView(random, built.input);
+        coarse.settle(nothing());
+        fine.settle(everything());
+        for (Adaption* adaption : {&walker, &coarse, &fine}) {
+            adaption->settle(view);
+            EXPECT_EQ(applied(adaption->mesh()), reference.closure(built.mesh, view));
+        }
+        expectSame(walker.mesh(), coarse.mesh());
+        expectSame(walker.mesh(), fine.mesh());
+    }
+}
+
+TEST_P(Adapted, StaysAMeshInEveryPass) {
+    const Built built = buildFor(GetParam().make());
+    Adaption adaption(built.mesh);
+    const Topology topology = topologyOf(adaption.mesh());
+    std::mt19937 random(12);
+    uint64_t operations = 0;
+    for (int pass = 0; pass < 200 && !testing::Test::HasFailure(); ++pass) {
+        operations += adaption.pass(randomView(random, built.input)).operations();
+        expectSound(adaption.mesh());
+        EXPECT_EQ(topologyOf(adaption.mesh()), topology);
+    }
+    EXPECT_EQ(operations > 0, !built.mesh.operation.empty());
+}
+
+TEST_P(Adapted, AHundredCyclesLeaveTheBaseBitForBit) {
+    const Built built = buildFor(GetParam().make());
+    Adaption adaption(built.mesh);
+    std::mt19937 random(13);
+    for (int cycle = 0; cycle < 100; ++cycle) {
+        for (uint32_t pass = 0; pass < random() % 8; ++pass)
+            adaption.pass(randomView(random, built.input));
+        if (cycle % 10 == 9) adaption.settle(nothing());
+    }
+    const ActiveMesh base(built.mesh);
+    EXPECT_EQ(adaption.mesh().vertex, base.vertex);
+    EXPECT_EQ(adaption.mesh().index, base.index);
+    EXPECT_EQ(adaption.mesh().twin, base.twin);
+}
+
+uint64_t hashOf(const ActiveMesh& mesh) {
+    uint64_t hash = mesh.vertexCount();
+    const auto add = [&](const auto& array) {
+        hash = hashBytes(array.data(), array.size() * sizeof(array[0]), hash);
+    };
+    add(mesh.vertex);
+    add(mesh.index);
+    add(mesh.twin);
+    for (const VertexRecord& r : mesh.record)
+        for (const uint32_t x : {r.name, r.corner, r.next, r.last}) hash = mixBits(hash + x);
+    return hash;
+}
+
+TEST(Adaption, HasTheSameArraysForAnyNumberOfThreads) {
+    const Built built = buildFor(onLattice(dented(test::sphereShape(60), 0.002), 20000));
+    std::vector<uint64_t> expected;
+    for (const int jobs : {1, 2, 7}) {
+        const ThreadLimit limit(jobs);
+        Adaption adaption(built.mesh);
+        std::mt19937 random(14);
+        std::vector<uint64_t> hashes;
+        for (int i = 0; i < 12; ++i) {
+            const Criterion view = randomView(random, built.input);
+            for (int pass = 0; pass < 6; ++pass) {
+                adaption.pass(view);
+                hashes.push_back(hashOf(adaption.mesh()));
+            }
+        }
+        if (jobs == 1) expected = hashes;
+        EXPECT_EQ(hashes, expected);
+    }
+}
+
+/// Negative control: where a needed operation may hide below one that is not, what comes out
+/// depends on what was before.
+TEST(Adaption, DependsOnHistoryWhereErrorsAreNotSaturated) {
+    Built built = buildFor(onLattice(dented(test::sphereShape(24), 0.01), 3000));
+    std::mt19937 random(15);
+    for (Operation& o : built.mesh.operation)
+        o.error = uint8_t(std::max(int(o.error) - int(random() % 8), 1));
+    Adaption coarse(built.mesh), fine(built.mesh);
+    int differ = 0;
+    for (int i = 0; i < 10; ++i) {
+        const Criterion view = randomView(random, built.input);
+        coarse.settle(nothing());
+        fine.settle(everything());
+        coarse.settle(view);
+        fine.settle(view);
+        differ += applied(coarse.mesh()) != applied(fine.mesh());
+    }
+    EXPECT_GT(differ, 0);
+}
+
+TEST(Adaption, OfTheDragonGoesThereAndBack) {
+    const std::filesystem::path path =
+        test::sharedFolder() / "data" / "scans" / "dragon_vrip.ply.gz";
+    if (!std::filesystem::exists(path)) GTEST_SKIP() << "no shared data";
+    Budget budget(size_t(2) << 30);
+    TempSpace space{testing::TempDir(), &budget, size_t(64) << 20};
+    Progress progress;
+    Built built;
+    WholeMesh whole = readWholeMesh(*openSource({path}), path, {}, space, progress);
+    const Lattice lattice = whole.lattice;
+    const size_t triangles = whole.mesh.triangleCount();
+    built.mesh = buildInCore(std::move(whole.mesh), lattice, budget, &built.counts);
+    EXPECT_EQ(validate(built.mesh), "");
+    EXPECT_LT(built.counts.levels, 300u);
+    Adaption adaption(built.mesh);
+    adaption.settle(everything());
+    EXPECT_EQ(adaption.mesh().faceCount(), triangles);
+    adaption.settle(nothing());
+    const ActiveMesh base(built.mesh);
+    EXPECT_EQ(adaption.mesh().vertex, base.vertex);
+    EXPECT_EQ(adaption.mesh().index, base.index);
+}
+
+}  // namespace
+}  // namespace pietra::pmesh

@@ -1,0 +1,42 @@
+#pragma once
+// Which operations a view needs: those whose error, at the point of their sphere nearest to the
+// eye, shows. Integers only, so every body of the adaption decides alike; and monotone in error and
+// sphere, so that what saturation ordered stays in order, also where a comparison is close.
+
+#include <array>
+#include <cstdint>
+
+#include "methods/pmesh/active_mesh.h"
+#include "multires/view.h"
+
+namespace pietra::pmesh {
+
+struct Criterion {
+    /// In steps; each coordinate within +-kFarthestEye.
+    Vec3i eye{0, 0, 0};
+    /// For each code of an error: the distance in steps, at most kFarthest, from which it shows. 0
+    /// for code 0: there is no operation.
+    std::array<int32_t, 256> reach{};
+
+    static constexpr int32_t kFarthestEye = 1 << 24, kFarthest = 1 << 25;
+
+    bool needs(const Vec3i& centre, uint32_t error, uint32_t radius_code) const {
+        const Vec3l d(centre - eye);  // below 2^25 each
+        const int64_t distance = reach[error] + int64_t(decodeRounded<11>(radius_code));
+        return distance * distance > d.x * d.x + d.y * d.y + d.z * d.z;
+    }
+    bool needsSplit(const Vertex& v, const VertexCriteria& c) const {
+        return needs(v.position(), c.split_error, c.split_radius);
+    }
+    /// False only if the operation that the vertex came from is not needed, maybe.
+    bool needsLast(const Vertex& v, const VertexCriteria& c) const {
+        return needs(v.position(), c.merge_error, c.merge_radius);
+    }
+};
+
+/// Needed is what shows as more than `pixels`. An eye beyond kFarthestEye is moved there.
+Criterion criterionOf(const View& view, const Lattice& lattice, double pixels);
+/// Needed is what states more than `error`, in lattice units, wherever it is.
+Criterion criterionOf(double error, const Lattice& lattice);
+
+}  // namespace pietra::pmesh
