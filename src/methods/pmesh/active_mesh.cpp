@@ -48,6 +48,7 @@ void ActiveMesh::resize(size_t vertices, size_t faces) {
 
 void ActiveMesh::setNext(uint32_t v, OperationId next) {
     record[v].next = next;
+    record[v].changed = time;
     const bool none = next == kNoOperation;
     record[v].next_level = none ? uint16_t(kLeafLevel) : source_->operation[next].level;
     criteria[v].split_radius = none ? uint16_t(0) : source_->operation[next].radius;
@@ -251,6 +252,7 @@ void ActiveMesh::fillHoles(std::vector<uint32_t>& free_vertices,
 void ActiveMesh::moveVertex(uint32_t from, uint32_t to) {
     vertex[to] = vertex[from];
     record[to] = record[from];
+    record[to].changed = time;
     criteria[to] = criteria[from];
     const uint32_t first = record[to].corner;
     for (uint32_t c = first; c != kNoCorner;) {

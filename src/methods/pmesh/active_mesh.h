@@ -33,6 +33,8 @@ struct alignas(32) VertexRecord {
     uint16_t last_level;   ///< 1 + that of `last`, or 0
     uint16_t undo_normal;  ///< of the v of the split that made this one, u, as v was before
     OperationId undo_last;
+    uint32_t changed =
+        0;  ///< ActiveMesh::time when it last split, merged, or moved to another place
 };
 static_assert(sizeof(VertexRecord) == 32);
 
@@ -61,6 +63,7 @@ public:
     /// The base mesh. `mesh` must outlive this; validate() must find no fault.
     explicit ActiveMesh(const ProgressiveMesh& mesh);
 
+    uint32_t time = 0;  ///< for VertexRecord::changed; the caller's
     std::vector<Vertex> vertex;
     std::vector<VertexRecord> record;
     std::vector<VertexCriteria> criteria;

@@ -49,6 +49,8 @@ void Adaption::forBlocks(Body&& body) {
 }
 
 PassCounts Adaption::pass(const Criterion& criterion) {
+    ++mesh_.time;
+    blocker_.resize(mesh_.vertexCount());
     mark(criterion);
     for (uint32_t round = 0; isFresh(round); round ^= 1) force(round);
     findMerges(criterion);
@@ -105,23 +107,30 @@ void Adaption::force(uint32_t round) {
 
 /// A marked vertex may split, or marks those that must before it.
 void Adaption::visitMarked(uint32_t v, uint32_t round) {
-    const uint8_t fresh = round == 0 ? kFresh0 : kFresh1, next = kFresh0 ^ kFresh1 ^ fresh;
-    clearState(v, fresh);
+    clearState(v, round == 0 ? kFresh0 : kFresh1);
+    if (isBlocked(v, kMarked)) return markForced(blocker_[v].by, round ^ 1);
     const uint16_t level = mesh_.record[v].next_level;
-    bool is_lowest = true;
+    uint32_t lowest = v;
     mesh_.allNeighbours(v, [&](uint32_t w) {
         const uint16_t other = mesh_.record[w].next_level;
         DCHECK(other != level || level == kLeafLevel);
-        if (other >= level) return true;
-        is_lowest = false;
-        if (stateOf(w) & kMarked) return true;
-        setState(w, kMarked | next);
-        std::atomic_ref(block_[w / kBlockVertices].fresh[round ^ 1]).store(true, kRelaxed);
+        if (other < level) markForced(w, round ^ 1);
+        if (other < mesh_.record[lowest].next_level) lowest = w;
         return true;
     });
-    if (!is_lowest) return;
-    setState(v, kMaySplit);
-    block_[v / kBlockVertices].may_split = true;
+    if (lowest != v) {
+        blocker_[v] = {lowest, mesh_.time, kMarked};
+    } else {
+        setState(v, kMaySplit);
+        block_[v / kBlockVertices].may_split = true;
+    }
+}
+
+/// To be visited in `round`, the next one.
+void Adaption::markForced(uint32_t w, uint32_t round) {
+    if (stateOf(w) & kMarked) return;
+    setState(w, kMarked | (round == 0 ? kFresh0 : kFresh1));
+    std::atomic_ref(block_[w / kBlockVertices].fresh[round]).store(true, kRelaxed);
 }
 
 void Adaption::findMerges(const Criterion& criterion) {
@@ -133,7 +142,8 @@ void Adaption::findMerges(const Criterion& criterion) {
     });
 }
 
-bool Adaption::mayMerge(uint32_t u, const Criterion& criterion, uint32_t& v) const {
+bool Adaption::mayMerge(uint32_t u, const Criterion& criterion, uint32_t& v) {
+    if ((stateOf(u) & kMarked) || isBlocked(u, kMayUndo)) return false;
     const uint16_t level = mesh_.record[u].last_level;
     const OperationId id = mesh_.record[u].last;
     const Operation& o = mesh_.source().operation[id];
@@ -141,10 +151,15 @@ bool Adaption::mayMerge(uint32_t u, const Criterion& criterion, uint32_t& v) con
     const auto allows = [&](uint32_t w) {
         if (w == u || w == v) return true;
         if (mesh_.record[w].last == id) return v = w, true;
-        return !(stateOf(w) & kMarked) && mesh_.record[w].last_level < level;
+        if (mesh_.record[w].last_level >= level) {
+            blocker_[u] = {w, mesh_.time, kMayUndo};
+            return false;
+        }
+        return !(stateOf(w) & kMarked);
     };
-    if ((stateOf(u) & kMarked) || !mesh_.allNeighbours(u, allows)) return false;
-    if (v == kNoCorner || (stateOf(v) & kMarked) || !mesh_.allNeighbours(v, allows)) return false;
+    if (!mesh_.allNeighbours(u, allows)) return false;
+    CHECK_NE(v, kNoCorner);  // or it has split again, and a neighbour has that level
+    if ((stateOf(v) & kMarked) || !mesh_.allNeighbours(v, allows)) return false;
     return !criterion.needs(mesh_.vertex[v].position() - o.offset(0), o.error, o.radius);
 }
 

@@ -59,6 +59,18 @@ private:
 
     template <class Body>
     void forBlocks(Body&& body);
+    /// Why a vertex could not do what it wants: a neighbour. As long as neither has changed since,
+    /// it still cannot, and its star need not be walked again.
+    struct Blocker {
+        uint32_t by = 0;
+        uint32_t time = 0;  ///< when this was found; 0: never
+        uint8_t want = 0;   ///< the bit of its state
+    };
+    bool isBlocked(uint32_t v, uint8_t want) const {
+        const Blocker& b = blocker_[v];
+        return b.want == want && mesh_.record[v].changed < b.time && b.by < mesh_.vertexCount() &&
+               mesh_.record[b.by].changed < b.time;
+    }
     uint8_t stateOf(uint32_t v) const {
         return uint8_t(std::atomic_ref(const_cast<uint64_t&>(states_[v / 8]))
                            .load(std::memory_order_relaxed) >>
@@ -75,14 +87,16 @@ private:
     bool isFresh(uint32_t round) const;
     void force(uint32_t round);
     void visitMarked(uint32_t v, uint32_t round);
+    void markForced(uint32_t w, uint32_t round);
     void findMerges(const Criterion& criterion);
-    bool mayMerge(uint32_t u, const Criterion& criterion, uint32_t& v) const;
+    bool mayMerge(uint32_t u, const Criterion& criterion, uint32_t& v);
     void listWork();
     void applyWork();
 
     ActiveMesh mesh_;
     std::vector<uint64_t> states_;  ///< eight vertices a word
     std::vector<Block> block_;
+    std::vector<Blocker> blocker_;
     std::vector<Split> split_;
     std::vector<Merge> merge_;
     std::vector<uint32_t> free_vertex_, free_face_;
