@@ -1,7 +1,10 @@
 #include "methods/pmesh/active_mesh.h"
 
+#include <tbb/parallel_sort.h>
+
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "base/check.h"
 #include "base/parallel.h"
@@ -21,11 +24,46 @@ uint16_t radiusAroundU(const Operation& o) {
     return uint16_t(decodeRadius(code) > rest ? code - 1 : code);
 }
 
+/// Every third bit of the result.
+uint64_t spread(uint32_t x) {
+    uint64_t bits = x & 0x1fffff;
+    bits = (bits | bits << 32) & 0x001f00000000ffff;
+    bits = (bits | bits << 16) & 0x001f0000ff0000ff;
+    bits = (bits | bits << 8) & 0x100f00f00f00f00f;
+    bits = (bits | bits << 4) & 0x10c30c30c30c30c3;
+    return (bits | bits << 2) & 0x1249249249249249;
+}
+
+/// Where each of `count` elements goes: those from `first` on by their keys, the others stay.
+template <class KeyOf>
+std::vector<uint32_t> placesByKey(size_t first, size_t count, KeyOf&& key_of) {
+    std::vector<std::pair<uint64_t, uint32_t>> order(count - first);
+    parallelForSlices(order.size(), 16 * kGrain, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i)
+            order[i] = {key_of(uint32_t(first + i)), uint32_t(first + i)};
+    });
+    tbb::parallel_sort(order.begin(), order.end());
+    std::vector<uint32_t> place(count);
+    std::iota(place.begin(), place.begin() + ptrdiff_t(first), 0u);
+    for (size_t i = 0; i < order.size(); ++i) place[order[i].second] = uint32_t(first + i);
+    return place;
+}
+
+template <class T>
+void permute(std::vector<T>& elements, const std::vector<uint32_t>& place) {
+    std::vector<T> moved(elements.size());
+    parallelForSlices(elements.size(), 16 * kGrain, [&](size_t begin, size_t end) {
+        for (size_t i = begin; i < end; ++i) moved[place[i]] = elements[i];
+    });
+    elements.swap(moved);
+}
+
 }  // namespace
 
 ActiveMesh::ActiveMesh(const ProgressiveMesh& mesh) : source_(&mesh) {
     HalfEdges edges = findHalfEdges(mesh.base_triangle, mesh.base_vertex.size());
     vertex = mesh.base_vertex;
+    pulse.resize(vertex.size());
     record.resize(vertex.size());
     criteria.resize(vertex.size());
     for (uint32_t v = 0; v < vertex.size(); ++v) {
@@ -34,31 +72,34 @@ ActiveMesh::ActiveMesh(const ProgressiveMesh& mesh) : source_(&mesh) {
         setLast(v, kNoOperation);
         setNext(v, mesh.base_operation[v]);
     }
-    for (const Triangle& t : mesh.base_triangle) index.insert(index.end(), t.begin(), t.end());
-    twin = std::move(edges.twin);
+    face.resize(mesh.base_triangle.size());
+    for (uint32_t f = 0; f < face.size(); ++f)
+        for (uint32_t k = 0; k < 3; ++k) {
+            face[f].vertex[k] = mesh.base_triangle[f][k];
+            face[f].twin[k] = edges.twin[3 * f + k];
+        }
 }
 
 void ActiveMesh::resize(size_t vertices, size_t faces) {
     vertex.resize(vertices);
+    pulse.resize(vertices);
     record.resize(vertices);
     criteria.resize(vertices);
-    index.resize(3 * faces);
-    twin.resize(3 * faces);
+    face.resize(faces);
 }
 
 void ActiveMesh::setNext(uint32_t v, OperationId next) {
     record[v].next = next;
-    record[v].changed = time;
+    pulse[v].changed = time;
     const bool none = next == kNoOperation;
-    record[v].next_level = none ? uint16_t(kLeafLevel) : source_->operation[next].level;
+    pulse[v].next_level = none ? uint16_t(kLeafLevel) : source_->operation[next].level;
     criteria[v].split_radius = none ? uint16_t(0) : source_->operation[next].radius;
     criteria[v].split_error = none ? uint8_t(0) : source_->operation[next].error;
 }
 
 void ActiveMesh::setLast(uint32_t v, OperationId last) {
-    VertexRecord& r = record[v];
-    r.last = last;
-    r.last_level =
+    record[v].last = last;
+    pulse[v].last_level =
         last == kNoOperation ? uint16_t(0) : uint16_t(source_->operation[last].level + 1);
     const bool fresh = canUndo(v);
     criteria[v].merge_radius =
@@ -83,19 +124,9 @@ bool ActiveMesh::readStar(uint32_t v, Star& star) const {
     return star.neighbours() <= kMaxNeighbours;
 }
 
-uint32_t ActiveMesh::partnerOf(uint32_t u) const {
-    if (source_->operation[record[u].last].isDummy()) return u;
-    uint32_t v = kNoCorner;
-    allNeighbours(u, [&](uint32_t w) {
-        if (record[w].last == record[u].last) v = w;
-        return v == kNoCorner;
-    });
-    return v;
-}
-
 void ActiveMesh::link(uint32_t half_edge, uint32_t other) {
-    if (half_edge != kNoCorner) twin[slotOf(half_edge)] = other;
-    if (other != kNoCorner) twin[slotOf(other)] = half_edge;
+    if (half_edge != kNoCorner) setTwin(half_edge, other);
+    if (other != kNoCorner) setTwin(other, half_edge);
 }
 
 /// The first corner of the fan that has this one, or this one where the fan is closed.
@@ -124,7 +155,7 @@ void ActiveMesh::moveBack(uint32_t v) {
     setNext(v, id);
 }
 
-void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t face) {
+void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t first_face) {
     const OperationId id = record[v].next;
     const Operation& o = source_->operation[id];
     const uint32_t n = star.count, l = o.rankLeft(), r = o.rankRight();
@@ -140,13 +171,13 @@ void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t face) 
     const uint32_t begin = has_right ? r : 0, end = has_left ? l : n;
     for (uint32_t i = begin, left = end >= begin ? end - begin : n - begin + end; left > 0;
          --left) {
-        index[slotOf(star.corner[i])] = u;
+        setVertexAt(star.corner[i], u);
         if (++i == n) i = 0;
     }
-    const uint32_t fl = 4 * face, fr = has_left ? fl + 4 : fl;
+    const uint32_t fl = 4 * first_face, fr = has_left ? fl + 4 : fl;
     if (has_left) {
         const uint32_t of_u = triangle(l - 1), of_v = triangle(l);
-        std::copy_n(std::array{v, u, vl}.begin(), 3, &index[slotOf(fl)]);
+        face[fl >> 2].vertex = {v, u, vl, 0};
         link(fl, has_right ? fr : kNoCorner);
         link(fl + 1, of_u == kNoCorner ? kNoCorner : previousCorner(of_u));
         link(fl + 2, of_v);
@@ -154,7 +185,7 @@ void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t face) 
     }
     if (has_right) {
         const uint32_t of_v = triangle(r - 1), of_u = triangle(r);
-        std::copy_n(std::array{u, v, vr}.begin(), 3, &index[slotOf(fr)]);
+        face[fr >> 2].vertex = {u, v, vr, 0};
         if (!has_left) link(fr, kNoCorner);
         link(fr + 1, of_v == kNoCorner ? kNoCorner : previousCorner(of_v));
         link(fr + 2, of_u);
@@ -186,7 +217,7 @@ std::array<uint32_t, 2> ActiveMesh::merge(uint32_t v, uint32_t u) {
     const bool open = twinOf(a.corner) == kNoCorner || twinOf(b.corner) == kNoCorner;
     uint32_t fl = kNoCorner, fr = kNoCorner;  // their first corners: of v, of u
     for (uint32_t c = b.corner; c != kNoCorner;) {
-        index[slotOf(c)] = v;
+        setVertexAt(c, v);
         if (vertexAt(previousCorner(c)) == v) fl = previousCorner(c);
         if (vertexAt(nextCorner(c)) == v) fr = c;
         c = leftOf(c);
@@ -252,11 +283,12 @@ void ActiveMesh::fillHoles(std::vector<uint32_t>& free_vertices,
 void ActiveMesh::moveVertex(uint32_t from, uint32_t to) {
     vertex[to] = vertex[from];
     record[to] = record[from];
-    record[to].changed = time;
+    pulse[to] = pulse[from];
+    pulse[to].changed = time;
     criteria[to] = criteria[from];
     const uint32_t first = record[to].corner;
     for (uint32_t c = first; c != kNoCorner;) {
-        index[slotOf(c)] = to;
+        setVertexAt(c, to);
         c = leftOf(c);
         if (c == first) break;
     }
@@ -273,15 +305,47 @@ void ActiveMesh::moveFaces(const std::vector<uint32_t>& from, const std::vector<
             for (uint32_t k = 0; k < 3; ++k) {
                 const uint32_t old_corner = 4 * from[i] + k, new_corner = 4 * to[i] + k;
                 const uint32_t v = vertexAt(old_corner), t = twinOf(old_corner);
-                index[slotOf(new_corner)] = v;
+                setVertexAt(new_corner, v);
                 if (corner(v).load(kRelaxed) == old_corner) corner(v).store(new_corner, kRelaxed);
                 if (t == kNoCorner || t >> 2 < count) {
                     link(new_corner, t);
                 } else {
-                    twin[slotOf(new_corner)] = 4 * new_place[(t >> 2) - count] + (t & 3);
+                    setTwin(new_corner, 4 * new_place[(t >> 2) - count] + (t & 3));
                 }
             }
     });
+}
+
+void ActiveMesh::sortInSpace() {
+    const std::vector<uint32_t> place =
+        placesByKey(source_->base_vertex.size(), vertexCount(), [&](uint32_t v) {
+            const Vertex& p = vertex[v];
+            return spread(uint32_t(p.x)) | spread(uint32_t(p.y)) << 1 | spread(uint32_t(p.z)) << 2;
+        });
+    const std::vector<uint32_t> face_place =
+        placesByKey(source_->base_triangle.size(), faceCount(), [&](uint32_t f) {
+            const auto& v = face[f].vertex;
+            return std::min({place[v[0]], place[v[1]], place[v[2]]});
+        });
+    const auto moved = [&](uint32_t& corner) {
+        if (corner != kNoCorner) corner = 4 * face_place[corner >> 2] + (corner & 3);
+    };
+    parallelForSlices(faceCount(), 16 * kGrain, [&](size_t begin, size_t end) {
+        for (size_t f = begin; f < end; ++f)
+            for (size_t k = 0; k < 3; ++k) {
+                face[f].vertex[k] = place[face[f].vertex[k]];
+                moved(face[f].twin[k]);
+            }
+    });
+    for (size_t v = 0; v < vertexCount(); ++v) {
+        moved(record[v].corner);
+        pulse[v].changed = time;
+    }
+    permute(vertex, place);
+    permute(pulse, place);
+    permute(criteria, place);
+    permute(record, place);
+    permute(face, face_place);
 }
 
 }  // namespace pietra::pmesh

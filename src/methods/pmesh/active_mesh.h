@@ -23,20 +23,29 @@
 
 namespace pietra::pmesh {
 
-/// What the adaption knows of a vertex beside what is drawn.
-struct alignas(32) VertexRecord {
-    uint32_t name;
-    uint32_t corner;       ///< one of its corners; where the fan is open, the first
-    OperationId next;      ///< its next split, or kNoOperation
-    OperationId last;      ///< the split it came from last, or kNoOperation
-    uint16_t next_level;   ///< of `next`, or kLeafLevel
-    uint16_t last_level;   ///< 1 + that of `last`, or 0
-    uint16_t undo_normal;  ///< of the v of the split that made this one, u, as v was before
-    OperationId undo_last;
-    uint32_t changed =
-        0;  ///< ActiveMesh::time when it last split, merged, or moved to another place
+/// A triangle: its corners, and the half-edges opposite to those that begin at them, or kNoCorner.
+struct alignas(32) ActiveFace {
+    std::array<uint32_t, 4> vertex{};  ///< the fourth is padding
+    std::array<uint32_t, 4> twin{};
+    bool operator==(const ActiveFace&) const = default;
 };
-static_assert(sizeof(VertexRecord) == 32);
+
+/// What an operation on a vertex needs.
+struct VertexRecord {
+    uint32_t name;
+    uint32_t corner;        ///< one of its corners; where the fan is open, the first
+    OperationId next;       ///< its next split, or kNoOperation
+    OperationId last;       ///< the split it came from last, or kNoOperation
+    OperationId undo_last;  ///< if it is the u of a split: what v had before
+    uint32_t undo_normal;   ///< the same
+};
+
+/// What a vertex's neighbours look at.
+struct VertexPulse {
+    uint16_t next_level;   ///< of the next split, or kLeafLevel
+    uint16_t last_level;   ///< 1 + that of the last, or 0; equal only for v and u of one split
+    uint32_t changed = 0;  ///< ActiveMesh::time when it last split, merged or got another place
+};
 
 /// The spheres and errors that a scan for work compares (criterion.h): those of the next split,
 /// around the vertex, and, where the vertex is u and as its split left it, those of that split;
@@ -63,20 +72,20 @@ public:
     /// The base mesh. `mesh` must outlive this; validate() must find no fault.
     explicit ActiveMesh(const ProgressiveMesh& mesh);
 
-    uint32_t time = 0;  ///< for VertexRecord::changed; the caller's
+    uint32_t time = 0;  ///< for VertexPulse::changed; the caller's
     std::vector<Vertex> vertex;
-    std::vector<VertexRecord> record;
+    std::vector<VertexPulse> pulse;
     std::vector<VertexCriteria> criteria;
-    std::vector<uint32_t> index;  ///< three a face: what is drawn
-    std::vector<uint32_t> twin;   ///< three a face: a half-edge or kNoCorner
+    std::vector<VertexRecord> record;
+    std::vector<ActiveFace> face;
 
     const ProgressiveMesh& source() const { return *source_; }
     size_t vertexCount() const { return vertex.size(); }
-    size_t faceCount() const { return index.size() / 3; }
+    size_t faceCount() const { return face.size(); }
     void resize(size_t vertices, size_t faces);
 
-    uint32_t vertexAt(uint32_t corner) const { return index[slotOf(corner)]; }
-    uint32_t twinOf(uint32_t half_edge) const { return twin[slotOf(half_edge)]; }
+    uint32_t vertexAt(uint32_t corner) const { return face[corner >> 2].vertex[corner & 3]; }
+    uint32_t twinOf(uint32_t half_edge) const { return face[half_edge >> 2].twin[half_edge & 3]; }
     /// The corner at the same vertex in the next face counter-clockwise, or kNoCorner.
     uint32_t leftOf(uint32_t corner) const { return twinOf(previousCorner(corner)); }
 
@@ -100,15 +109,13 @@ public:
 
     /// For a u that canUndo(): the v of its last operation, itself if that is a dummy; kNoCorner if
     /// v has split again.
-    uint32_t partnerOf(uint32_t u) const;
-
     /// Performs the next operation of v, a dummy; undoes its last, one too.
     void move(uint32_t v);
     void moveBack(uint32_t v);
 
     /// Performs the next split of v, no dummy, whose star is `star`. u and the faces from `face`
     /// on, one for each of the operation's ranks, are made; room for them must be there.
-    void split(uint32_t v, const Star& star, uint32_t u, uint32_t face);
+    void split(uint32_t v, const Star& star, uint32_t u, uint32_t first_face);
 
     /// Undoes the split that made v and u of one. Returns the faces that are free now, kNoCorner
     /// for none. u is free too; its record's name is kNoCorner then.
@@ -117,9 +124,17 @@ public:
     /// Moves the last elements into the places of these, all different, and shrinks the arrays.
     void fillHoles(std::vector<uint32_t>& free_vertices, std::vector<uint32_t>& free_faces);
 
+    /// Puts vertices and faces that are neighbours near each other, but for those of the base:
+    /// walks then find them in the cache.
+    void sortInSpace();
+
 private:
     /// Of a neighbour: other operations may look at it, but only one has a reason to change it.
     std::atomic_ref<uint32_t> corner(uint32_t v) { return std::atomic_ref(record[v].corner); }
+    void setVertexAt(uint32_t corner, uint32_t v) { face[corner >> 2].vertex[corner & 3] = v; }
+    void setTwin(uint32_t half_edge, uint32_t other) {
+        face[half_edge >> 2].twin[half_edge & 3] = other;
+    }
     void setNext(uint32_t v, OperationId next);
     void setLast(uint32_t v, OperationId last);
     void link(uint32_t half_edge, uint32_t other);

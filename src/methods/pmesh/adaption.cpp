@@ -19,6 +19,8 @@ enum State : uint8_t {
     kMayUndo = 16,  ///< its last operation is not needed
 };
 constexpr size_t kBlockVertices = 4096;
+/// Operations after which sorting may pay: what fits the second-level cache needs none.
+constexpr size_t kLeastSort = 4096;
 constexpr size_t kGrain = 256;  // operations
 constexpr auto kRelaxed = std::memory_order_relaxed;
 
@@ -56,7 +58,13 @@ PassCounts Adaption::pass(const Criterion& criterion) {
     findMerges(criterion);
     listWork();
     applyWork();
-    return {uint32_t(split_.size()), uint32_t(merge_.size())};
+    const PassCounts counts{uint32_t(split_.size()), uint32_t(merge_.size())};
+    since_sort_ += counts.operations();
+    if (since_sort_ > std::max(kLeastSort, mesh_.vertexCount())) {
+        mesh_.sortInSpace();
+        since_sort_ = 0;
+    }
+    return counts;
 }
 
 int Adaption::settle(const Criterion& criterion) {
@@ -109,13 +117,13 @@ void Adaption::force(uint32_t round) {
 void Adaption::visitMarked(uint32_t v, uint32_t round) {
     clearState(v, round == 0 ? kFresh0 : kFresh1);
     if (isBlocked(v, kMarked)) return markForced(blocker_[v].by, round ^ 1);
-    const uint16_t level = mesh_.record[v].next_level;
+    const uint16_t level = mesh_.pulse[v].next_level;
     uint32_t lowest = v;
     mesh_.allNeighbours(v, [&](uint32_t w) {
-        const uint16_t other = mesh_.record[w].next_level;
+        const uint16_t other = mesh_.pulse[w].next_level;
         DCHECK(other != level || level == kLeafLevel);
         if (other < level) markForced(w, round ^ 1);
-        if (other < mesh_.record[lowest].next_level) lowest = w;
+        if (other < mesh_.pulse[lowest].next_level) lowest = w;
         return true;
     });
     if (lowest != v) {
@@ -144,14 +152,15 @@ void Adaption::findMerges(const Criterion& criterion) {
 
 bool Adaption::mayMerge(uint32_t u, const Criterion& criterion, uint32_t& v) {
     if ((stateOf(u) & kMarked) || isBlocked(u, kMayUndo)) return false;
-    const uint16_t level = mesh_.record[u].last_level;
+    const uint16_t level = mesh_.pulse[u].last_level;
     const OperationId id = mesh_.record[u].last;
     const Operation& o = mesh_.source().operation[id];
     v = o.isDummy() ? u : kNoCorner;
     const auto allows = [&](uint32_t w) {
         if (w == u || w == v) return true;
-        if (mesh_.record[w].last == id) return v = w, true;
-        if (mesh_.record[w].last_level >= level) {
+        const uint16_t other = mesh_.pulse[w].last_level;
+        if (other == level) return v = w, true;
+        if (other > level) {
             blocker_[u] = {w, mesh_.time, kMayUndo};
             return false;
         }

@@ -11,7 +11,8 @@
 //      other neighbour's last one has its level or a higher one. Where both meet, splits win: no
 //      vertex around may be marked.
 //   4. Prefix sums give new vertices and faces their places; all splits and merges are done.
-//   5. The last elements move into the places that merges left.
+//   5. The last elements move into the places that merges left; after as many operations as there
+//      are vertices, all are sorted in space.
 //
 // The set of operations applied when nothing is left to do is the least one that holds all that is
 // needed and is closed under dependency: it depends on the criterion alone, not on what was before.
@@ -68,8 +69,8 @@ private:
     };
     bool isBlocked(uint32_t v, uint8_t want) const {
         const Blocker& b = blocker_[v];
-        return b.want == want && mesh_.record[v].changed < b.time && b.by < mesh_.vertexCount() &&
-               mesh_.record[b.by].changed < b.time;
+        return b.want == want && mesh_.pulse[v].changed < b.time && b.by < mesh_.vertexCount() &&
+               mesh_.pulse[b.by].changed < b.time;
     }
     uint8_t stateOf(uint32_t v) const {
         return uint8_t(std::atomic_ref(const_cast<uint64_t&>(states_[v / 8]))
@@ -94,6 +95,7 @@ private:
     void applyWork();
 
     ActiveMesh mesh_;
+    size_t since_sort_ = 0;         ///< operations
     std::vector<uint64_t> states_;  ///< eight vertices a word
     std::vector<Block> block_;
     std::vector<Blocker> blocker_;

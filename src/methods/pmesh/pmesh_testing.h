@@ -107,7 +107,7 @@ inline std::vector<Triangle> namedTriangles(const ActiveMesh& mesh) {
     std::vector<Triangle> triangles;
     for (uint32_t f = 0; f < mesh.faceCount(); ++f) {
         Triangle t;
-        for (uint32_t k = 0; k < 3; ++k) t[k] = mesh.record[mesh.index[3 * f + k]].name;
+        for (uint32_t k = 0; k < 3; ++k) t[k] = mesh.record[mesh.vertexAt(4 * f + k)].name;
         std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
         triangles.push_back(t);
     }
@@ -147,12 +147,12 @@ inline Topology topologyOf(const ActiveMesh& mesh) {
     bool simple = true;
     for (uint32_t f = 0; f < mesh.faceCount(); ++f)
         for (uint32_t k = 0; k < 3; ++k) {
-            const uint32_t a = mesh.index[3 * f + k], b = mesh.index[3 * f + (k + 1) % 3];
+            const uint32_t a = mesh.vertexAt(4 * f + k), b = mesh.vertexAt(4 * f + (k + 1) % 3);
             ++uses[std::minmax(a, b)];
         }
     for (uint32_t f = 0; f < mesh.faceCount(); ++f)
         for (uint32_t k = 0; k < 3; ++k) {
-            const uint32_t a = mesh.index[3 * f + k], b = mesh.index[3 * f + (k + 1) % 3];
+            const uint32_t a = mesh.vertexAt(4 * f + k), b = mesh.vertexAt(4 * f + (k + 1) % 3);
             if (uses[std::minmax(a, b)] == 1) simple &= border_next.emplace(a, b).second;
         }
     Topology topology;
@@ -172,7 +172,7 @@ inline void expectSound(const ActiveMesh& mesh) {
     std::set<Triangle> seen;
     std::vector<uint32_t> corners(mesh.vertexCount(), 0);
     for (uint32_t f = 0; f < mesh.faceCount(); ++f) {
-        Triangle t{mesh.index[3 * f], mesh.index[3 * f + 1], mesh.index[3 * f + 2]};
+        Triangle t{mesh.vertexAt(4 * f), mesh.vertexAt(4 * f + 1), mesh.vertexAt(4 * f + 2)};
         for (uint32_t k = 0; k < 3; ++k) {
             ASSERT_LT(t[k], mesh.vertexCount());
             ++corners[t[k]];
@@ -190,9 +190,10 @@ inline void expectSound(const ActiveMesh& mesh) {
     for (uint32_t v = 0; v < mesh.vertexCount(); ++v) {
         const VertexRecord& r = mesh.record[v];
         const OperationId none = kNoOperation;
-        EXPECT_EQ(r.next_level,
+        EXPECT_EQ(mesh.pulse[v].next_level,
                   r.next == none ? kLeafLevel : mesh.source().operation[r.next].level);
-        EXPECT_EQ(r.last_level, r.last == none ? 0u : mesh.source().operation[r.last].level + 1u);
+        EXPECT_EQ(mesh.pulse[v].last_level,
+                  r.last == none ? 0u : mesh.source().operation[r.last].level + 1u);
         if (r.next == none && r.last == none) continue;  // may be irregular
         ASSERT_NE(r.corner, kNoCorner);
         EXPECT_EQ(mesh.vertexAt(r.corner), v);
@@ -205,8 +206,8 @@ inline void expectSound(const ActiveMesh& mesh) {
         EXPECT_EQ(reached, corners[v]);
         EXPECT_TRUE(closed || mesh.twinOf(r.corner) == kNoCorner) << "not the first corner";
         mesh.allNeighbours(v, [&](uint32_t w) {
-            const uint16_t level = mesh.record[w].next_level;
-            EXPECT_TRUE(level != r.next_level || level == kLeafLevel) << "equal levels";
+            const uint16_t level = mesh.pulse[w].next_level;
+            EXPECT_TRUE(level != mesh.pulse[v].next_level || level == kLeafLevel) << "equal levels";
             return true;
         });
     }
