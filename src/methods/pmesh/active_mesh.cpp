@@ -107,21 +107,16 @@ void ActiveMesh::setLast(uint32_t v, OperationId last) {
     criteria[v].merge_error = fresh ? source_->operation[last].error : uint8_t(0);
 }
 
-bool ActiveMesh::readStar(uint32_t v, Star& star) const {
-    const uint32_t first = record[v].corner;
-    uint32_t least = 0, least_name = ~0u, count = 0, c = first;
-    do {
-        if (count == kMaxNeighbours) return false;
-        const uint32_t name = record[vertexAt(nextCorner(c))].name;
-        if (name < least_name) least = count, least_name = name;
-        star.corner[count++] = c;
-        c = leftOf(c);
-    } while (c != first && c != kNoCorner);
-    star.count = count;
-    star.closed = c == first;
-    if (star.closed)
-        std::rotate(star.corner.begin(), star.corner.begin() + least, star.corner.begin() + count);
-    return star.neighbours() <= kMaxNeighbours;
+bool ActiveMesh::orient(Star& star) const {
+    if (star.count == 0 || star.neighbours() > kMaxNeighbours) return false;
+    if (!star.closed) return true;
+    uint32_t least = 0, least_name = ~0u;
+    for (uint32_t i = 0; i < star.count; ++i) {
+        const uint32_t name = record[neighbour(star, i)].name;
+        if (name < least_name) least = i, least_name = name;
+    }
+    std::rotate(star.corner.begin(), star.corner.begin() + least, star.corner.begin() + star.count);
+    return true;
 }
 
 void ActiveMesh::link(uint32_t half_edge, uint32_t other) {

@@ -16,6 +16,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "methods/pmesh/operations.h"
@@ -58,12 +59,12 @@ struct VertexCriteria {
     static constexpr uint16_t kEverNeeded = encodeRoundedUp<11>(1 << 28);
 };
 
-/// The triangles around a vertex that may split or be merged, counter-clockwise: a closed fan from
-/// the neighbour of the least name, an open one from its beginning.
+/// The triangles around a vertex, counter-clockwise; where the fan is open, from its beginning.
 struct Star {
-    uint32_t count = 0;
+    static constexpr uint32_t kRoom = 24;
+    uint32_t count = 0;  ///< 0: more than there is room for
     bool closed = false;
-    std::array<uint32_t, kMaxNeighbours> corner;  ///< at the vertex
+    std::array<uint32_t, kRoom> corner;  ///< at the vertex
     uint32_t neighbours() const { return closed ? count : count + 1; }
 };
 
@@ -94,8 +95,19 @@ public:
     template <class Body>
     bool allNeighbours(uint32_t v, Body&& body) const;
 
-    /// False if v has too many neighbours to split.
-    [[nodiscard]] bool readStar(uint32_t v, Star& star) const;
+    /// The same of v's star as gathered.
+    template <class Body>
+    bool allNeighbours(uint32_t v, const Star& star, Body&& body) const;
+
+    /// Walks around several vertices in step, so that what one waits for, others use. At most
+    /// kTogether at a time; prefetch(w) is called for each neighbour. Stars begin anywhere.
+    static constexpr uint32_t kTogether = 16;
+    template <class Prefetch>
+    void gatherStars(std::span<const uint32_t> vertices, Star* stars, Prefetch&& prefetch) const;
+
+    /// Turns the star of a vertex that is to split so that ranks count from its beginning: where it
+    /// is closed, at the neighbour of the least name. False if it has too many neighbours.
+    [[nodiscard]] bool orient(Star& star) const;
     uint32_t neighbour(const Star& star, uint32_t rank) const {
         return rank < star.count ? vertexAt(nextCorner(star.corner[rank]))
                                  : vertexAt(previousCorner(star.corner[star.count - 1]));
@@ -113,8 +125,8 @@ public:
     void move(uint32_t v);
     void moveBack(uint32_t v);
 
-    /// Performs the next split of v, no dummy, whose star is `star`. u and the faces from `face`
-    /// on, one for each of the operation's ranks, are made; room for them must be there.
+    /// Performs the next split of v, no dummy, whose oriented star is `star`. u and the faces from
+    /// `face` on, one for each of the operation's ranks, are made; room for them must be there.
     void split(uint32_t v, const Star& star, uint32_t u, uint32_t first_face);
 
     /// Undoes the split that made v and u of one. Returns the faces that are free now, kNoCorner
@@ -155,6 +167,46 @@ bool ActiveMesh::allNeighbours(uint32_t v, Body&& body) const {
         if (left == kNoCorner) return body(vertexAt(before));
         if (left == first) return true;
         c = left;
+    }
+}
+
+template <class Body>
+bool ActiveMesh::allNeighbours(uint32_t v, const Star& star, Body&& body) const {
+    if (star.count == 0) return allNeighbours(v, body);
+    for (uint32_t rank = 0; rank < star.neighbours(); ++rank)
+        if (!body(neighbour(star, rank))) return false;
+    return true;
+}
+
+template <class Prefetch>
+void ActiveMesh::gatherStars(std::span<const uint32_t> vertices, Star* stars,
+                             Prefetch&& prefetch) const {
+    std::array<uint32_t, kTogether> corner, walking;
+    uint32_t count = uint32_t(vertices.size());
+    for (uint32_t i = 0; i < count; ++i) {
+        corner[i] = record[vertices[i]].corner;
+        __builtin_prefetch(&face[corner[i] >> 2]);
+        stars[i].count = 0;
+        walking[i] = i;
+    }
+    while (count > 0) {
+        uint32_t still = 0;
+        for (uint32_t j = 0; j < count; ++j) {
+            const uint32_t i = walking[j], c = corner[i];
+            Star& star = stars[i];
+            star.corner[star.count++] = c;
+            prefetch(vertexAt(nextCorner(c)));
+            corner[i] = leftOf(c);
+            star.closed = corner[i] == star.corner[0];
+            if (star.closed || corner[i] == kNoCorner) continue;
+            if (star.count == Star::kRoom) {
+                star.count = 0;
+                continue;
+            }
+            __builtin_prefetch(&face[corner[i] >> 2]);
+            walking[still++] = i;
+        }
+        count = still;
     }
 }
 

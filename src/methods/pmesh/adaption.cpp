@@ -50,6 +50,18 @@ void Adaption::forBlocks(Body&& body) {
     });
 }
 
+/// Calls body(v, star) for all of these, in order.
+template <class Body>
+void Adaption::forStars(std::span<const uint32_t> vertices, Body&& body) const {
+    std::array<Star, ActiveMesh::kTogether> stars;
+    for (size_t begin = 0; begin < vertices.size(); begin += stars.size()) {
+        const auto some = vertices.subspan(begin, std::min(stars.size(), vertices.size() - begin));
+        mesh_.gatherStars(some, stars.data(),
+                          [&](uint32_t w) { __builtin_prefetch(&mesh_.pulse[w]); });
+        for (size_t i = 0; i < some.size(); ++i) body(some[i], stars[i]);
+    }
+}
+
 PassCounts Adaption::pass(const Criterion& criterion) {
     ++mesh_.time;
     blocker_.resize(mesh_.vertexCount());
@@ -105,33 +117,41 @@ bool Adaption::isFresh(uint32_t round) const {
 }
 
 void Adaption::force(uint32_t round) {
+    const uint8_t fresh = round == 0 ? kFresh0 : kFresh1;
     forBlocks([&](Block& block, size_t begin, size_t end) {
         if (!block.fresh[round]) return;
         block.fresh[round] = false;
-        forStates(states_, begin, end, round == 0 ? kFresh0 : kFresh1,
-                  [&](uint32_t v) { visitMarked(v, round); });
+        block.open.clear();
+        forStates(states_, begin, end, fresh, [&](uint32_t v) {
+            clearState(v, fresh);
+            if (isBlocked(v, kMarked)) {
+                markForced(blocker_[v].by, round ^ 1);
+            } else {
+                block.open.push_back(v);
+            }
+        });
+        forStars(block.open, [&](uint32_t v, const Star& star) {
+            if (!forceAround(v, star, round ^ 1)) return;
+            setState(v, kMaySplit);
+            block.may_split = true;
+        });
     });
 }
 
-/// A marked vertex may split, or marks those that must before it.
-void Adaption::visitMarked(uint32_t v, uint32_t round) {
-    clearState(v, round == 0 ? kFresh0 : kFresh1);
-    if (isBlocked(v, kMarked)) return markForced(blocker_[v].by, round ^ 1);
+/// True if v may split; else marks those that must before it.
+bool Adaption::forceAround(uint32_t v, const Star& star, uint32_t next_round) {
     const uint16_t level = mesh_.pulse[v].next_level;
     uint32_t lowest = v;
-    mesh_.allNeighbours(v, [&](uint32_t w) {
+    mesh_.allNeighbours(v, star, [&](uint32_t w) {
         const uint16_t other = mesh_.pulse[w].next_level;
         DCHECK(other != level || level == kLeafLevel);
-        if (other < level) markForced(w, round ^ 1);
+        if (other < level) markForced(w, next_round);
         if (other < mesh_.pulse[lowest].next_level) lowest = w;
         return true;
     });
-    if (lowest != v) {
-        blocker_[v] = {lowest, mesh_.time, kMarked};
-    } else {
-        setState(v, kMaySplit);
-        block_[v / kBlockVertices].may_split = true;
-    }
+    if (lowest == v) return true;
+    blocker_[v] = {lowest, mesh_.time, kMarked};
+    return false;
 }
 
 /// To be visited in `round`, the next one.
@@ -144,20 +164,37 @@ void Adaption::markForced(uint32_t w, uint32_t round) {
 void Adaption::findMerges(const Criterion& criterion) {
     forBlocks([&](Block& block, size_t begin, size_t end) {
         if (!block.may_undo) return;
+        block.open.clear();
         forStates(states_, begin, end, kMayUndo, [&](uint32_t u) {
-            if (uint32_t v; mayMerge(u, criterion, v)) block.merge.push_back({v, u});
+            if (!(stateOf(u) & kMarked) && !isBlocked(u, kMayUndo)) block.open.push_back(u);
         });
+        block.merge.clear();
+        std::vector<uint32_t> others;
+        forStars(block.open, [&](uint32_t u, const Star& star) {
+            const bool dummy = operationBefore(u).isDummy();
+            uint32_t v = dummy ? u : kNoCorner;
+            if (!allowsMerge(u, star, u, v)) return;
+            CHECK_NE(v, kNoCorner);  // or it has split again, and a neighbour has that level
+            const Operation& o = operationBefore(u);
+            const Vec3i centre = mesh_.vertex[v].position() - o.offset(0);
+            if ((stateOf(v) & kMarked) || criterion.needs(centre, o.error, o.radius)) return;
+            block.merge.push_back({v, u});
+            others.push_back(v);
+        });
+        size_t i = 0, kept = 0;
+        forStars(others, [&](uint32_t v, const Star& star) {
+            Merge& merge = block.merge[i++];
+            if (allowsMerge(v, star, merge.u, merge.v)) block.merge[kept++] = merge;
+        });
+        block.merge.resize(kept);
     });
 }
 
-bool Adaption::mayMerge(uint32_t u, const Criterion& criterion, uint32_t& v) {
-    if ((stateOf(u) & kMarked) || isBlocked(u, kMayUndo)) return false;
+/// Whether the neighbours of an end of the operation that made u allow to undo it. Finds v.
+bool Adaption::allowsMerge(uint32_t end, const Star& star, uint32_t u, uint32_t& v) {
     const uint16_t level = mesh_.pulse[u].last_level;
-    const OperationId id = mesh_.record[u].last;
-    const Operation& o = mesh_.source().operation[id];
-    v = o.isDummy() ? u : kNoCorner;
-    const auto allows = [&](uint32_t w) {
-        if (w == u || w == v) return true;
+    return mesh_.allNeighbours(end, star, [&](uint32_t w) {
+        if (w == u) return true;
         const uint16_t other = mesh_.pulse[w].last_level;
         if (other == level) return v = w, true;
         if (other > level) {
@@ -165,11 +202,7 @@ bool Adaption::mayMerge(uint32_t u, const Criterion& criterion, uint32_t& v) {
             return false;
         }
         return !(stateOf(w) & kMarked);
-    };
-    if (!mesh_.allNeighbours(u, allows)) return false;
-    CHECK_NE(v, kNoCorner);  // or it has split again, and a neighbour has that level
-    if ((stateOf(v) & kMarked) || !mesh_.allNeighbours(v, allows)) return false;
-    return !criterion.needs(mesh_.vertex[v].position() - o.offset(0), o.error, o.radius);
+    });
 }
 
 /// The work of all blocks in the order of the vertices, with places for what is new.
@@ -194,17 +227,22 @@ void Adaption::listWork() {
     mesh_.resize(u, face);
 }
 
+void Adaption::split(const Split& s, Star& star) {
+    if (mesh_.source().operation[mesh_.record[s.v].next].isDummy()) return mesh_.move(s.v);
+    CHECK(mesh_.orient(star));
+    mesh_.split(s.v, star, s.u, s.face);
+}
+
 void Adaption::applyWork() {
     parallelForSlices(split_.size(), kGrain, [&](size_t begin, size_t end) {
-        Star star;
-        for (size_t i = begin; i < end; ++i) {
-            const Split& s = split_[i];
-            if (mesh_.source().operation[mesh_.record[s.v].next].isDummy()) {
-                mesh_.move(s.v);
-            } else {
-                CHECK(mesh_.readStar(s.v, star));
-                mesh_.split(s.v, star, s.u, s.face);
-            }
+        std::array<uint32_t, ActiveMesh::kTogether> vertices;
+        std::array<Star, ActiveMesh::kTogether> stars;
+        for (size_t count; begin < end; begin += count) {
+            count = std::min(end - begin, vertices.size());
+            for (size_t i = 0; i < count; ++i) vertices[i] = split_[begin + i].v;
+            mesh_.gatherStars({vertices.data(), count}, stars.data(),
+                              [&](uint32_t w) { __builtin_prefetch(&mesh_.record[w]); });
+            for (size_t i = 0; i < count; ++i) split(split_[begin + i], stars[i]);
         }
     });
     if (merge_.empty()) return;

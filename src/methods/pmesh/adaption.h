@@ -21,6 +21,7 @@
 // reads 24 bytes a vertex. Not thread-safe.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "methods/pmesh/active_mesh.h"
@@ -55,6 +56,7 @@ private:
     struct Block {
         std::array<bool, 2> fresh{};  ///< some vertex is marked and not looked at yet
         bool may_split = false, may_undo = false;
+        std::vector<uint32_t> open;  ///< vertices whose stars must be looked at
         std::vector<Merge> merge;
     };
 
@@ -87,11 +89,17 @@ private:
     void mark(const Criterion& criterion);
     bool isFresh(uint32_t round) const;
     void force(uint32_t round);
-    void visitMarked(uint32_t v, uint32_t round);
+    template <class Body>
+    void forStars(std::span<const uint32_t> vertices, Body&& body) const;
+    const Operation& operationBefore(uint32_t u) const {
+        return mesh_.source().operation[mesh_.record[u].last];
+    }
+    bool forceAround(uint32_t v, const Star& star, uint32_t next_round);
     void markForced(uint32_t w, uint32_t round);
     void findMerges(const Criterion& criterion);
-    bool mayMerge(uint32_t u, const Criterion& criterion, uint32_t& v);
+    bool allowsMerge(uint32_t end, const Star& star, uint32_t u, uint32_t& v);
     void listWork();
+    void split(const Split& split, Star& star);
     void applyWork();
 
     ActiveMesh mesh_;

@@ -49,7 +49,8 @@ struct Reference {
         const Operation& o = mesh.source().operation[mesh.record[v].next];
         if (o.isDummy()) return mesh.move(v);
         Star star;
-        ASSERT_TRUE(mesh.readStar(v, star));
+        mesh.gatherStars(std::span(&v, 1), &star, [](uint32_t) {});
+        ASSERT_TRUE(mesh.orient(star));
         const size_t u = mesh.vertexCount(), face = mesh.faceCount();
         mesh.resize(u + 1, face + (o.rankLeft() != kNoRank) + (o.rankRight() != kNoRank));
         mesh.split(v, star, uint32_t(u), uint32_t(face));

@@ -174,7 +174,8 @@ void Encoder::encode(ActiveMesh& active, OperationId id, const CollapseRecord& r
     Operation& o = mesh_.operation[id];
     const uint32_t v = slot_of_[r.v], u = uint32_t(active.vertexCount());
     Star star;
-    CHECK(active.readStar(v, star));
+    active.gatherStars(std::span(&v, 1), &star, [](uint32_t) {});
+    CHECK(active.orient(star));
     uint32_t left = kNoRank, right = kNoRank, radius = 0;
     const Vec3i from = active.vertex[v].position();
     for (uint32_t rank = 0; rank < star.neighbours(); ++rank) {
