@@ -227,41 +227,78 @@ void Adaption::listWork() {
     mesh_.resize(u, face);
 }
 
-void Adaption::split(const Split& s, Star& star) {
-    if (mesh_.source().operation[mesh_.record[s.v].next].isDummy()) return mesh_.move(s.v);
-    CHECK(mesh_.orient(star));
-    mesh_.split(s.v, star, s.u, s.face);
+/// What an operation between `id` and those after or before it reads, but for the star.
+void Adaption::prefetch(uint32_t v, OperationId id) const {
+    __builtin_prefetch(&mesh_.source().operation[id]);
+    __builtin_prefetch(&mesh_.vertex[v], 1);
+    __builtin_prefetch(&mesh_.criteria[v], 1);
+    __builtin_prefetch(&mesh_.pulse[v], 1);
+}
+
+void Adaption::applySplits(std::span<const Split> splits) {
+    std::array<uint32_t, ActiveMesh::kTogether> vertices;
+    std::array<Star, ActiveMesh::kTogether> stars;
+    for (size_t i = 0; i < splits.size(); ++i) {
+        vertices[i] = splits[i].v;
+        prefetch(splits[i].v, mesh_.record[splits[i].v].next);
+    }
+    mesh_.gatherStars({vertices.data(), splits.size()}, stars.data(),
+                      [&](uint32_t w) { __builtin_prefetch(&mesh_.record[w]); });
+    for (const Split& s : splits)
+        for (const OperationId child : mesh_.source().operation[mesh_.record[s.v].next].child)
+            if (child != kNoOperation) __builtin_prefetch(&mesh_.source().operation[child]);
+    for (size_t i = 0; i < splits.size(); ++i) {
+        const Split& s = splits[i];
+        if (mesh_.source().operation[mesh_.record[s.v].next].isDummy()) {
+            mesh_.move(s.v);
+        } else {
+            CHECK(mesh_.orient(stars[i]));
+            mesh_.split(s.v, stars[i], s.u, s.face);
+        }
+    }
+}
+
+/// `first`: the place of the first of these in the list.
+void Adaption::applyMerges(std::span<const Merge> merges, size_t first) {
+    std::array<uint32_t, ActiveMesh::kTogether> vertices;
+    std::array<Star, ActiveMesh::kTogether> stars;
+    for (size_t i = 0; i < merges.size(); ++i) {
+        vertices[i] = merges[i].u;
+        prefetch(merges[i].v, mesh_.record[merges[i].u].last);
+        __builtin_prefetch(&mesh_.record[merges[i].v]);
+    }
+    mesh_.gatherStars({vertices.data(), merges.size()}, stars.data(), [&](uint32_t) {});
+    for (const Merge& m : merges) {
+        const OperationId before = mesh_.record[m.u].undo_last;
+        if (before != kNoOperation) __builtin_prefetch(&mesh_.source().operation[before]);
+    }
+    for (size_t i = 0; i < merges.size(); ++i) {
+        const auto [v, u] = merges[i];
+        std::array<uint32_t, 2> faces{kNoCorner, kNoCorner};
+        if (u == v) {
+            mesh_.moveBack(v);
+        } else {
+            faces = mesh_.merge(v, u);
+        }
+        free_vertex_[first + i] = u == v ? kNoCorner : u;
+        free_face_[2 * (first + i)] = faces[0];
+        free_face_[2 * (first + i) + 1] = faces[1];
+    }
 }
 
 void Adaption::applyWork() {
-    parallelForSlices(split_.size(), kGrain, [&](size_t begin, size_t end) {
-        std::array<uint32_t, ActiveMesh::kTogether> vertices;
-        std::array<Star, ActiveMesh::kTogether> stars;
-        for (size_t count; begin < end; begin += count) {
-            count = std::min(end - begin, vertices.size());
-            for (size_t i = 0; i < count; ++i) vertices[i] = split_[begin + i].v;
-            mesh_.gatherStars({vertices.data(), count}, stars.data(),
-                              [&](uint32_t w) { __builtin_prefetch(&mesh_.record[w]); });
-            for (size_t i = 0; i < count; ++i) split(split_[begin + i], stars[i]);
-        }
-    });
+    static constexpr size_t kTogether = ActiveMesh::kTogether;
+    const auto forSome = [](const auto& list, auto&& body) {
+        parallelForSlices(list.size(), kGrain, [&](size_t begin, size_t end) {
+            for (; begin < end; begin += kTogether)
+                body(std::span(list).subspan(begin, std::min(kTogether, end - begin)), begin);
+        });
+    };
+    forSome(split_, [&](std::span<const Split> splits, size_t) { applySplits(splits); });
     if (merge_.empty()) return;
     free_vertex_.resize(merge_.size());
     free_face_.resize(2 * merge_.size());
-    parallelForSlices(merge_.size(), kGrain, [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i) {
-            const auto [v, u] = merge_[i];
-            std::array<uint32_t, 2> faces{kNoCorner, kNoCorner};
-            if (u == v) {
-                mesh_.moveBack(v);
-            } else {
-                faces = mesh_.merge(v, u);
-            }
-            free_vertex_[i] = u == v ? kNoCorner : u;
-            free_face_[2 * i] = faces[0];
-            free_face_[2 * i + 1] = faces[1];
-        }
-    });
+    forSome(merge_, [&](std::span<const Merge> m, size_t first) { applyMerges(m, first); });
     std::erase(free_vertex_, kNoCorner);
     std::erase(free_face_, kNoCorner);
     mesh_.fillHoles(free_vertex_, free_face_);

@@ -99,7 +99,9 @@ private:
     void findMerges(const Criterion& criterion);
     bool allowsMerge(uint32_t end, const Star& star, uint32_t u, uint32_t& v);
     void listWork();
-    void split(const Split& split, Star& star);
+    void prefetch(uint32_t v, OperationId id) const;
+    void applySplits(std::span<const Split> splits);
+    void applyMerges(std::span<const Merge> merges, size_t first);
     void applyWork();
 
     ActiveMesh mesh_;
