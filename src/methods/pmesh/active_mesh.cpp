@@ -1,5 +1,6 @@
 #include "methods/pmesh/active_mesh.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
@@ -148,6 +149,22 @@ void ActiveMesh::moveBack(uint32_t v) {
     vertex[v].moveBy(-o.offset(0));
     setLast(v, o.child[1]);
     setNext(v, id);
+}
+
+bool ActiveMesh::apply(uint32_t v) {
+    const Operation& o = source_->operation[record[v].next];
+    if (o.isDummy()) return move(v), true;
+    Star star;
+    gatherStars({&v, 1}, &star, [](uint32_t) {});
+    if (!orient(star)) return false;
+    const uint32_t faces = (o.rankLeft() != kNoRank) + (o.rankRight() != kNoRank);
+    for (const uint32_t rank : {o.rankLeft(), o.rankRight()})
+        if (rank != kNoRank && rank >= star.neighbours()) return false;
+    if (star.closed && faces < 2) return false;
+    const uint32_t u = uint32_t(vertexCount()), first_face = uint32_t(faceCount());
+    resize(u + 1, first_face + faces);
+    split(v, star, u, first_face);
+    return true;
 }
 
 void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t first_face) {
@@ -341,6 +358,27 @@ void ActiveMesh::sortInSpace() {
     permute(criteria, place);
     permute(record, place);
     permute(face, face_place);
+}
+
+std::string validateStars(const ProgressiveMesh& mesh) {
+    ActiveMesh active(mesh);
+    std::vector<uint32_t> vertex_of(mesh.operation.size());
+    for (uint32_t v = 0; v < active.vertexCount(); ++v)
+        if (active.record[v].next != kNoOperation) vertex_of[active.record[v].next] = v;
+    for (OperationId id = 0; id < mesh.operation.size(); ++id) {
+        const Operation& o = mesh.operation[id];
+        const uint32_t v = vertex_of[id];
+        if (active.record[v].corner == kNoCorner)
+            return fmt::format("operation {}: its vertex has no triangles", id);
+        if (!active.allNeighbours(v,
+                                  [&](uint32_t w) { return active.pulse[w].next_level > o.level; }))
+            return fmt::format("operation {}: a neighbour does not split after it", id);
+        if (!active.apply(v)) return fmt::format("operation {}: its ranks do not fit its star", id);
+        for (const int end : {0, 1})
+            if (o.childOf(end) != kNoOperation)
+                vertex_of[o.childOf(end)] = end == 0 ? v : uint32_t(active.vertexCount() - 1);
+    }
+    return "";
 }
 
 }  // namespace pietra::pmesh

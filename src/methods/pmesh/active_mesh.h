@@ -7,8 +7,8 @@
 //   - the vertices v and u,
 //   - the star's own triangles, and those that come or go,
 //   - the corner of a neighbour, if it is one of those that come or go.
-// No triangle lies in the stars of two operations of a pass (rules.h): so they run in any order, in
-// parallel, without atomics and without a copy, to the same bytes.
+// No triangle lies in the stars of two operations of a pass (adaption.h): so they run in any order,
+// in parallel, without atomics and without a copy, to the same bytes.
 //
 // Base vertices and base triangles keep their places for ever: refined and coarsened again, the
 // arrays are as they were.
@@ -17,6 +17,7 @@
 #include <atomic>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "methods/pmesh/operations.h"
@@ -49,8 +50,8 @@ struct VertexPulse {
 };
 
 /// The spheres and errors that a scan for work compares (criterion.h): those of the next split,
-/// around the vertex, and, where the vertex is u and as its split left it, those of that split;
-/// there the sphere is a smaller one around u, so that it tells in haste that nothing is to do.
+/// around the vertex, and, where canUndo(), those of the last one; there the sphere is a smaller
+/// one around u, which tells in haste that nothing is to do.
 struct VertexCriteria {
     uint16_t split_radius = 0;
     uint16_t merge_radius = kEverNeeded;
@@ -119,14 +120,17 @@ public:
                (record[u].name == source_->nameOf(last) || source_->operation[last].isDummy());
     }
 
-    /// For a u that canUndo(): the v of its last operation, itself if that is a dummy; kNoCorner if
-    /// v has split again.
+    /// Performs the next operation of v alone, and makes room for it. False, and nothing done, if
+    /// its ranks do not fit v's star.
+    [[nodiscard]] bool apply(uint32_t v);
+
     /// Performs the next operation of v, a dummy; undoes its last, one too.
     void move(uint32_t v);
     void moveBack(uint32_t v);
 
     /// Performs the next split of v, no dummy, whose oriented star is `star`. u and the faces from
-    /// `face` on, one for each of the operation's ranks, are made; room for them must be there.
+    /// `first_face` on, one for each of the operation's ranks, are made; room for them must be
+    /// there.
     void split(uint32_t v, const Star& star, uint32_t u, uint32_t first_face);
 
     /// Undoes the split that made v and u of one. Returns the faces that are free now, kNoCorner
@@ -157,6 +161,11 @@ private:
 
     const ProgressiveMesh* source_;
 };
+
+/// Applies all operations in their order; validate() must find no fault. Empty if each finds the
+/// star that it was encoded for, as far as that shows; else a sentence about the first that does
+/// not.
+[[nodiscard]] std::string validateStars(const ProgressiveMesh& mesh);
 
 template <class Body>
 bool ActiveMesh::allNeighbours(uint32_t v, Body&& body) const {

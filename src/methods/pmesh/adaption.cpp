@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <bit>
-#include <cstring>
 
 #include "base/check.h"
 #include "base/parallel.h"
@@ -168,7 +167,6 @@ void Adaption::findMerges(const Criterion& criterion) {
         forStates(states_, begin, end, kMayUndo, [&](uint32_t u) {
             if (!(stateOf(u) & kMarked) && !isBlocked(u, kMayUndo)) block.open.push_back(u);
         });
-        block.merge.clear();
         std::vector<uint32_t> others;
         forStars(block.open, [&](uint32_t u, const Star& star) {
             const bool dummy = operationBefore(u).isDummy();

@@ -4,9 +4,8 @@
 //
 // A pass, from the state before it:
 //   1. Mark every vertex whose next operation the criterion needs.
-//   2. A marked vertex with a neighbour of a lower level cannot be next: mark that neighbour; so
-//   on,
-//      in rounds over those newly marked, until there are none. One without may split.
+//   2. A marked vertex with a neighbour of a lower level must wait: mark that neighbour. So on, in
+//      rounds over those newly marked, until there are none. A marked one without may split.
 //   3. An operation that is not needed may be undone if it is the last of both its vertices, and no
 //      other neighbour's last one has its level or a higher one. Where both meet, splits win: no
 //      vertex around may be marked.
@@ -60,8 +59,6 @@ private:
         std::vector<Merge> merge;
     };
 
-    template <class Body>
-    void forBlocks(Body&& body);
     /// Why a vertex could not do what it wants: a neighbour. As long as neither has changed since,
     /// it still cannot, and its star need not be walked again.
     struct Blocker {
@@ -86,14 +83,16 @@ private:
         std::atomic_ref(states_[v / 8])
             .fetch_and(~(bits << (8 * (v % 8))), std::memory_order_relaxed);
     }
-    void mark(const Criterion& criterion);
-    bool isFresh(uint32_t round) const;
-    void force(uint32_t round);
-    template <class Body>
-    void forStars(std::span<const uint32_t> vertices, Body&& body) const;
     const Operation& operationBefore(uint32_t u) const {
         return mesh_.source().operation[mesh_.record[u].last];
     }
+    template <class Body>
+    void forBlocks(Body&& body);
+    template <class Body>
+    void forStars(std::span<const uint32_t> vertices, Body&& body) const;
+    void mark(const Criterion& criterion);
+    bool isFresh(uint32_t round) const;
+    void force(uint32_t round);
     bool forceAround(uint32_t v, const Star& star, uint32_t next_round);
     void markForced(uint32_t w, uint32_t round);
     void findMerges(const Criterion& criterion);

@@ -39,21 +39,10 @@ struct Reference {
             need(v);
             mesh.allNeighbours(v, need);
             centre.push_back(mesh.vertex[v].position());
-            apply(mesh, v);
+            EXPECT_TRUE(mesh.apply(v));
             wait(v);
             if (!source.operation[id].isDummy()) wait(uint32_t(mesh.vertexCount() - 1));
         }
-    }
-
-    static void apply(ActiveMesh& mesh, uint32_t v) {
-        const Operation& o = mesh.source().operation[mesh.record[v].next];
-        if (o.isDummy()) return mesh.move(v);
-        Star star;
-        mesh.gatherStars(std::span(&v, 1), &star, [](uint32_t) {});
-        ASSERT_TRUE(mesh.orient(star));
-        const size_t u = mesh.vertexCount(), face = mesh.faceCount();
-        mesh.resize(u + 1, face + (o.rankLeft() != kNoRank) + (o.rankRight() != kNoRank));
-        mesh.split(v, star, uint32_t(u), uint32_t(face));
     }
 
     std::vector<uint8_t> closure(const ProgressiveMesh& source, const Criterion& criterion) const {

@@ -23,20 +23,10 @@ void refineInOrder(ActiveMesh& mesh) {
     while (!waiting.empty()) {
         const auto [id, v] = *waiting.begin();
         waiting.erase(waiting.begin());
-        const Operation& o = mesh.source().operation[id];
-        if (o.isDummy()) {
-            mesh.move(v);
-            wait(v);
-            continue;
-        }
-        Star star;
-        mesh.gatherStars(std::span(&v, 1), &star, [](uint32_t) {});
-        ASSERT_TRUE(mesh.orient(star));
-        const size_t u = mesh.vertexCount(), face = mesh.faceCount();
-        mesh.resize(u + 1, face + (o.rankLeft() != kNoRank) + (o.rankRight() != kNoRank));
-        mesh.split(v, star, uint32_t(u), uint32_t(face));
+        const size_t before = mesh.vertexCount();
+        ASSERT_TRUE(mesh.apply(v));
         wait(v);
-        wait(uint32_t(u));
+        if (mesh.vertexCount() > before) wait(uint32_t(before));
     }
 }
 
@@ -61,6 +51,7 @@ void expectIsInput(const ActiveMesh& mesh, const Built& built) {
 TEST_P(EachMesh, RefinedInOrderItIsTheInput) {
     const Built built = buildFor(GetParam().make());
     EXPECT_EQ(validate(built.mesh), "");
+    EXPECT_EQ(validateStars(built.mesh), "");
     ActiveMesh mesh(built.mesh);
     expectSound(mesh);
     refineInOrder(mesh);
@@ -190,6 +181,26 @@ TEST_F(DamagedMesh, IsRefusedWithAMessage) {
     });
     expect(fmt::format("operation {}: its criteria exceed its parent's", last),
            [](ProgressiveMesh& m) { m.operation.back().error = 255; });
+}
+
+TEST_F(DamagedMesh, IsRefusedWhereStarsDoNotFit) {
+    const auto expect = [&](const std::string& message, const auto& damage) {
+        ProgressiveMesh damaged = mesh_;
+        damage(damaged);
+        EXPECT_EQ(validate(damaged), "");
+        EXPECT_EQ(validateStars(damaged), message);
+    };
+    expect("", [](ProgressiveMesh&) {});
+    expect("operation 9: its ranks do not fit its star",
+           [](ProgressiveMesh& m) { m.operation[9].ranks = 0x1e; });
+    expect("operation 9: its ranks do not fit its star",
+           [](ProgressiveMesh& m) { m.operation[9].ranks = 0xf1; });
+    expect("operation 0: its vertex has no triangles",
+           [](ProgressiveMesh& m) { m.base_triangle.clear(); });
+    expect("operation 0: a neighbour does not split after it", [](ProgressiveMesh& m) {
+        for (const OperationId o : m.base_operation)
+            if (o != kNoOperation) m.operation[o].level = 0;
+    });
 }
 
 }  // namespace
