@@ -17,7 +17,7 @@
 // needed and is closed under dependency: it depends on the criterion alone, not on what was before.
 //
 // The arrays after each pass are the same for any number of threads. A pass with nothing to do
-// reads 24 bytes a vertex. Not thread-safe.
+// reads 22 bytes a vertex. Not thread-safe.
 
 #include <cstdint>
 #include <span>
