@@ -157,6 +157,7 @@ void PagePool::load() {
     forgetUnwanted();
     reserve(begun);
     missing_ = 0;
+    for (const PageKey& key : arriving_) keepWhatWaitsFor(key);
     blocked_ = scattered_bytes_ > 0 && !makeRoomToDraw(scattered_bytes_, Need::kDraw);
     for (const Wanted& wanted : wanted_) {
         missing_ += wanted.need != Need::kLater;
@@ -247,17 +248,16 @@ bool PagePool::makeRoomToDraw(size_t bytes, Need need) {
             [&](const PageKey& key) { return leave(key); });
 }
 
-/// All may go at any time, those that tell where the eye is last.
+/// All but those that tell where the eye is: if these left for what is drawn, the eye would count
+/// as inside, more would be drawn, and so on for ever.
 std::vector<PageMemory::Victim> PagePool::copiesToDrop() const {
     std::vector<PageMemory::Victim> victims;
     for (uint32_t m = 0; m < models_.size(); ++m)
         for (PageIndex page = 0; page < models_[m]->bad.size(); ++page) {
             const SceneModel& model = *models_[m];
-            if (!model.hasCopy(page)) continue;
-            const bool eye = model.eye_used[page] == frame_;
-            const uint32_t drawn = model.last_used[page];
+            if (!model.hasCopy(page) || model.eye_used[page] == frame_) continue;
             const uint32_t latest = frame_ - PageMemory::kFramesKept;
-            victims.push_back({{m, page}, eye ? frame_ : std::min(drawn, latest)});
+            victims.push_back({{m, page}, std::min(model.last_used[page], latest)});
         }
     return victims;
 }

@@ -47,6 +47,8 @@ public:
     size_t missing() const { return missing_; }
     /// Of what may be drawn.
     const PageMemory& drawn() const { return sink_ != nullptr ? device_ : ram_; }
+    /// Whether so many bytes may stay in RAM, beside what passes through.
+    bool mayStay(size_t bytes) const { return sink_ == nullptr || bytes <= ram_.budget / 2; }
     /// In RAM, what is on its way included.
     size_t ramBytes() const { return ram_.used + begun_bytes_; }
     size_t deviceBytes() const { return device_.used; }

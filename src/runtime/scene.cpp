@@ -4,7 +4,10 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "base/error.h"
+#include "base/progress.h"
 #include "runtime/page_pool.h"
 
 namespace pietra {
@@ -183,9 +186,12 @@ bool Scene::Impl::mayBeInside(uint32_t m, const View& view) {
         return model.side->mayBeInside();
     EyeSide side(view.eye());
     bool known = true;
+    size_t bytes = 0;
+    const size_t missing_before = missing_for_eye_.size();
     model.refiner.visitDrawable(view, kEyeSidePixels, [&](NodeIndex i) {
         const Node& node = model.forest.node(i);
-        model.eye_used[node.page] = frame_number_;
+        if (std::exchange(model.eye_used[node.page], frame_number_) != frame_number_)
+            bytes += model.copy_bytes[node.page];
         if (const Mesh* mesh = model.mesh(i))
             side.add(node, *mesh);
         else
@@ -193,6 +199,11 @@ bool Scene::Impl::mayBeInside(uint32_t m, const View& view) {
         known &= model.hasCopy(node.page);
     });
     model.side.reset();
+    if (!pages_.mayStay(bytes)) {
+        missing_for_eye_.resize(missing_before);
+        for (uint32_t& frame : model.eye_used) frame = 0;
+        return true;
+    }
     if (!known) return true;
     model.side = side;
     model.side_departures = departures;
@@ -227,6 +238,7 @@ const Frame& Scene::update(const FrameRequest& request) {
 
 const Frame& Scene::converge(const FrameRequest& request) {
     for (;;) {
+        if (Progress::cancelRequested()) throw Interrupted();
         const Frame& frame = impl_->update(request);
         if (impl_->idle() || impl_->stuck()) return frame;
         std::this_thread::sleep_for(std::chrono::milliseconds(1));

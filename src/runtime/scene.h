@@ -76,7 +76,7 @@ public:
     /// Valid until the next call.
     const Frame& update(const FrameRequest& request);
     /// Waits until everything that `request` asks for is there or is known not to fit. For
-    /// screenshots and measurements.
+    /// screenshots and measurements. Throws Interrupted where that was asked for.
     const Frame& converge(const FrameRequest& request);
 
     /// Pages that cannot be read: a sentence each. What they hold is drawn coarser.

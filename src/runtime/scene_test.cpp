@@ -209,6 +209,22 @@ TEST_F(SceneTest, whatIsDrawnElsewhereNeedNotFitIntoRam) {
     EXPECT_GT(outside, 0);
 }
 
+TEST_F(SceneTest, scarceMemoryOfBothKindsSettles) {
+    const ModelReader model(closed_path_);
+    const size_t all = sizeOfAll(model);
+    for (const size_t ram : {all / 12, all / 6, all / 3})
+        for (const size_t device : {all / 6, all / 3, all}) {
+            FakeSink sink(device);
+            Scene scene({&model}, {tableBytes(model) + ram, 2, &sink});
+            for (int i = 0; i < 200; i += 40) {
+                FrameRequest request = flight(model, i);
+                request.pixels = 0.3;
+                request.prefetch = false;
+                scene.converge(request);  // returns
+            }
+        }
+}
+
 TEST_F(SceneTest, whatComesBackToTheSinkIsNotReadAgain) {
     const ModelReader model(path_);
     const size_t all = sizeOfAll(model);
