@@ -204,6 +204,7 @@ void decodeColour(const std::string& path, const Bytes& file, Picture& picture) 
         throw InputError(path, "", std::string("damaged PNG: ") + image.message);
 }
 
+/// Of what is no PNG, only so much as tells.
 Bytes readWhole(const std::string& path) {
     File file(path, File::Mode::kRead);
     Bytes bytes;
@@ -212,6 +213,7 @@ Bytes readWhole(const std::string& path) {
         bytes.resize(used + kStep);
         got = file.readSome(bytes.data() + used, kStep);
         bytes.resize(used + got);
+        if (used == 0 && (got < 8 || png_sig_cmp(bytes.data(), 0, 8) != 0)) break;
     }
     return bytes;
 }
