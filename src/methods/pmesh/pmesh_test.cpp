@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cstring>
+#include <string_view>
 
 #include "methods/pmesh/pmesh_testing.h"
 
@@ -84,9 +84,11 @@ TEST_P(EachMesh, TheSameBytesAgain) {
     const Built a = buildFor(input), b = buildFor(input);
     EXPECT_EQ(a.mesh.base_vertex, b.mesh.base_vertex);
     ASSERT_EQ(a.mesh.operation.size(), b.mesh.operation.size());
-    EXPECT_EQ(std::memcmp(a.mesh.operation.data(), b.mesh.operation.data(),
-                          a.mesh.operation.size() * sizeof(Operation)),
-              0);
+    const auto bytes = [](const Built& built) {
+        return std::string_view(reinterpret_cast<const char*>(built.mesh.operation.data()),
+                                built.mesh.operation.size() * sizeof(Operation));
+    };
+    EXPECT_EQ(bytes(a), bytes(b));
 }
 
 TEST(PmeshCodes, RoundUpAndAreMonotone) {
