@@ -2,38 +2,33 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <fstream>
 #include <map>
 #include <random>
 
 #include "base/check.h"
 #include "base/error.h"
+#include "base/scratch_directory.h"
 #include "store/terrain_model.h"
 
 namespace pietra {
 namespace {
 
-namespace fs = std::filesystem;
-
 class SceneTest : public ::testing::Test {
 protected:
     SceneTest() {
-        std::string pattern = (fs::temp_directory_path() / "pietra-scene-XXXXXX").string();
-        if (::mkdtemp(pattern.data()) == nullptr) std::abort();
-        directory_ = pattern;
         ToyTerrainSettings settings;
         settings.depth = 12;
         ToyTerrain terrain = makeToyTerrain(settings);
-        path_ = directory_ + "/terrain";
-        writeTerrainModel(terrain, path_, directory_, {0, 0, 0});
+        path_ = scratch_.file("terrain");
+        writeTerrainModel(terrain, path_, scratch_.path(), {0, 0, 0});
         for (Node& node : terrain.nodes) node.closed = true;
-        closed_path_ = directory_ + "/closed";
-        writeTerrainModel(terrain, closed_path_, directory_, {0, 0, 0});
+        closed_path_ = scratch_.file("closed");
+        writeTerrainModel(terrain, closed_path_, scratch_.path(), {0, 0, 0});
     }
-    ~SceneTest() override { fs::remove_all(directory_); }
 
-    std::string directory_, path_;
+    const ScratchDirectory scratch_;
+    std::string path_;
     std::string closed_path_;  // the same, as if it were part of something closed
 };
 
