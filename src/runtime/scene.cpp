@@ -8,12 +8,11 @@
 
 #include "base/error.h"
 #include "base/progress.h"
+#include "base/stopwatch.h"
 #include "runtime/page_pool.h"
 
 namespace pietra {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 /// How far ahead the camera is predicted, seconds, and the share of the tolerance that prefetching
 /// goes to where it stands.
@@ -22,10 +21,6 @@ constexpr double kLookahead = 0.5, kNextLevel = 0.5;
 constexpr double kComfortable = 0.8;
 /// By which the tolerance goes up in a frame that lacks memory, and down in one that has it.
 constexpr double kRaise = 1.1, kLower = 0.99, kMostRaised = 1 << 20;
-
-double msSince(Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 }  // namespace
 
@@ -67,7 +62,9 @@ private:
     PagePool pages_;
     std::vector<Missing> missing_;
     std::vector<PageKey> missing_for_eye_;
-    size_t used_bytes_ = 0;  // of the pages that this frame needs and has
+    std::vector<NodeIndex> cut_for_eye_;    // what tells where the eye is
+    std::vector<PageIndex> pages_for_eye_;  // that hold it
+    size_t used_bytes_ = 0;                 // of the pages that this frame needs and has
     double tolerance_factor_ = 1;
     uint32_t frame_number_ = PageMemory::kFramesKept;
     Camera last_camera_;
@@ -90,9 +87,9 @@ SceneModels Scene::Impl::makeModels(const std::vector<const ModelReader*>& reade
 }
 
 const Frame& Scene::Impl::update(const FrameRequest& request) {
-    const auto start = Clock::now();
+    const Stopwatch watch;
     pages_.publish(++frame_number_);
-    frame_.publish_ms = msSince(start);
+    frame_.publish_ms = watch.ms();
     select(request);
     wantMissing();
     if (request.prefetch) prefetch(request);
@@ -104,7 +101,7 @@ const Frame& Scene::Impl::update(const FrameRequest& request) {
     frame_.resident_bytes = pages_.ramBytes() + table_bytes_;
     frame_.device_bytes = pages_.deviceBytes();
     frame_.bytes_read = pages_.bytesRead();
-    frame_.select_ms = msSince(start) - frame_.publish_ms;
+    frame_.select_ms = watch.ms() - frame_.publish_ms;
     return frame_;
 }
 
@@ -184,27 +181,27 @@ bool Scene::Impl::mayBeInside(uint32_t m, const View& view) {
     const uint64_t departures = model.residency.departures();
     if (model.side && departures == model.side_departures && model.side->decides(view.eye()))
         return model.side->mayBeInside();
-    EyeSide side(view.eye());
-    bool known = true;
-    size_t bytes = 0;
-    const size_t missing_before = missing_for_eye_.size();
-    model.refiner.visitDrawable(view, kEyeSidePixels, [&](NodeIndex i) {
-        const Node& node = model.forest.node(i);
-        if (std::exchange(model.eye_used[node.page], frame_number_) != frame_number_)
-            bytes += model.copy_bytes[node.page];
-        if (const Mesh* mesh = model.mesh(i))
-            side.add(node, *mesh);
-        else
-            missing_for_eye_.push_back({m, node.page});
-        known &= model.hasCopy(node.page);
-    });
     model.side.reset();
-    if (!pages_.mayStay(bytes)) {
-        missing_for_eye_.resize(missing_before);
-        for (uint32_t& frame : model.eye_used) frame = 0;
-        return true;
+    cut_for_eye_.clear();
+    pages_for_eye_.clear();
+    model.refiner.visitDrawable(view, kEyeSidePixels, [&](NodeIndex i) {
+        cut_for_eye_.push_back(i);
+        pages_for_eye_.push_back(model.forest.node(i).page);
+    });
+    std::sort(pages_for_eye_.begin(), pages_for_eye_.end());
+    pages_for_eye_.erase(std::unique(pages_for_eye_.begin(), pages_for_eye_.end()),
+                         pages_for_eye_.end());
+    size_t bytes = 0;
+    for (const PageIndex page : pages_for_eye_) bytes += model.copy_bytes[page];
+    if (!pages_.mayStay(bytes)) return true;
+    const size_t missing_before = missing_for_eye_.size();
+    for (const PageIndex page : pages_for_eye_) {
+        model.eye_used[page] = frame_number_;
+        if (!model.hasCopy(page)) missing_for_eye_.push_back({m, page});
     }
-    if (!known) return true;
+    if (missing_for_eye_.size() > missing_before) return true;
+    EyeSide side(view.eye());
+    for (const NodeIndex i : cut_for_eye_) side.add(model.forest.node(i), *model.mesh(i));
     model.side = side;
     model.side_departures = departures;
     return side.mayBeInside();

@@ -6,7 +6,6 @@
 #include <imgui.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -14,6 +13,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "runtime/camera_path.h"
 #include "runtime/pick.h"
 #include "viewer/open_files.h"
@@ -24,17 +24,11 @@
 namespace pietra {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr double kFluentMs = 40;      // frames in motion may take this long
 constexpr double kMostCoarsened = 8;  // by which the tolerance is raised for that, at most
 constexpr double kAtRestSeconds = 0.15;
 constexpr double kRecordSeconds = 0.1;  // between two keys of a recorded path
 constexpr double kZoomStep = 0.85;
-
-double secondsSince(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// A name that is not taken: `stem`-1.`ending` and so on, in the current folder.
 std::string freeName(const char* stem, const char* ending) {
@@ -62,7 +56,7 @@ public:
 
     void run() {
         while (!quit_) {
-            const auto start = Clock::now();
+            const Stopwatch watch;
             handleEvents();
             flyByKeys();
             openWhatIsBuilt();
@@ -70,7 +64,7 @@ public:
             if (!ready()) drawScene();
             present();
             screen_->swap();
-            last_frame_ = secondsSince(start);
+            last_frame_ = watch.seconds();
             if (!ready()) figures_.add(float(1e3 * last_frame_));
             record();
         }
@@ -92,8 +86,8 @@ private:
     void zoomTo(int steps);
     void flyByKeys();
     void setPixels(double pixels);
-    void touch() { touched_ = Clock::now(); }
-    bool moving() const { return secondsSince(touched_) < kAtRestSeconds; }
+    void touch() { touched_.restart(); }
+    bool moving() const { return touched_.seconds() < kAtRestSeconds; }
     /// The picture on the screen is the one asked for.
     bool ready() const { return picture_size_.width > 0 && figures_.converged && !moving(); }
 
@@ -133,7 +127,7 @@ private:
         int measured;  // which end of the distance, or -1
     };
     std::vector<Pick> picks_;
-    Clock::time_point start_ = Clock::now(), touched_ = Clock::now(), last_key_{};
+    Stopwatch running_, touched_, last_key_;
     Camera frozen_camera_;
     CameraPath path_;
     double path_start_ = 0;
@@ -454,12 +448,12 @@ void Viewer::drawScene() {
     request.camera = frozen_camera_;
     request.size = size;
     request.pixels = state_.pixels * motion_factor_;
-    request.seconds = secondsSince(start_);
+    request.seconds = running_.seconds();
     request.prefetch = state_.prefetch;
     request.show_error = state_.show == Show::kError;
     const Frame& frame = scene_ ? scene_->update(request) : nothing_;
     shown_ = &frame;
-    const auto start = Clock::now();
+    const Stopwatch watch;
     const Lattice none;
     std::vector<ModelPatches> list;
     for (size_t m = 0; m < models_.size(); ++m) {
@@ -468,7 +462,7 @@ void Viewer::drawScene() {
     }
     if (list.empty()) list.push_back({View(control_.camera(), size, none), &none, {}});
     screen_->renderer().draw(list, {shade(), state_.samples, request.culling.occlusion});
-    figures_.draw_ms = 1e3 * secondsSince(start);
+    figures_.draw_ms = watch.ms();
     figures_.tolerance_px = frame.tolerance_px;
     figures_.converged = frame.converged && motion_factor_ == 1;
     figures_.triangles = frame.triangles;
@@ -526,7 +520,7 @@ void Viewer::toggleRecording() {
     state_.recording = !state_.recording;
     if (state_.recording) {
         path_ = {};
-        path_start_ = secondsSince(start_);
+        path_start_ = running_.seconds();
         state_.message = "recording";
         return;
     }
@@ -540,9 +534,9 @@ void Viewer::toggleRecording() {
 }
 
 void Viewer::record() {
-    if (!state_.recording || secondsSince(last_key_) < kRecordSeconds) return;
-    last_key_ = Clock::now();
-    path_.keys.push_back({secondsSince(start_) - path_start_, control_.camera()});
+    if (!state_.recording || last_key_.seconds() < kRecordSeconds) return;
+    last_key_.restart();
+    path_.keys.push_back({running_.seconds() - path_start_, control_.camera()});
 }
 
 }  // namespace
