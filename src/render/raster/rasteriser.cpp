@@ -22,6 +22,8 @@ namespace {
 
 /// A larger mesh is drawn in several chunks.
 constexpr size_t kChunkTriangles = 4096;
+/// A batch takes vertices up to so many and one patch more: 16 MB.
+constexpr size_t kBatchVertices = size_t(1) << 20;
 /// More tiles than threads, so that none waits long for the last one.
 constexpr size_t kTilesPerThread = 8;
 
@@ -64,7 +66,7 @@ struct Rasteriser::State {
     PixelBox screen() const { return {0, 0, picture.size.width, picture.size.height}; }
     void checkScalars(const Mesh& mesh) const;
     void beginBatch();
-    void append(std::span<const DrawPatch> patches);
+    void draw(std::span<const DrawPatch> patches, bool leave_out_hidden);
     void drawBatch(bool leave_out_hidden);
     void layOutVertices();
     void transform(BatchPatch& patch) const;
@@ -100,29 +102,34 @@ void Rasteriser::State::beginBatch() {
     CHECK(!finished);
     batch.model.clear();
     batch.patch.clear();
-    batch.triangles = 0;
+    batch.triangles = batch.vertices = 0;
 }
 
-void Rasteriser::State::append(std::span<const DrawPatch> patches) {
+/// Adds patches of the model to the batch, and draws what is more than it should hold.
+void Rasteriser::State::draw(std::span<const DrawPatch> patches, bool leave_out_hidden) {
+    batch.model.push_back(model);
     for (const DrawPatch& patch : patches) {
+        if (batch.vertices > kBatchVertices) {
+            drawBatch(leave_out_hidden);
+            beginBatch();
+            batch.model.push_back(model);
+        }
         checkScalars(*patch.mesh);
         BatchPatch entry;
         entry.patch = &patch;
-        entry.model = uint32_t(batch.model.size());
+        entry.model = uint32_t(batch.model.size() - 1);
         entry.first_number = uint32_t(batch.triangles);
         entry.both_sides = settings.two_sided || !patch.one_sided;
         entry.colour = patchColour(settings, patch);
         batch.patch.push_back(entry);
         batch.triangles += patch.mesh->triangleCount();
+        batch.vertices += patch.mesh->vertexCount();
+        CHECK_LT(batch.triangles, size_t(kMaxTriangleNumber));
     }
-    batch.model.push_back(model);
-    CHECK_LT(batch.triangles, size_t(kMaxTriangleNumber));
 }
 
 void Rasteriser::State::layOutVertices() {
-    size_t vertices = 0;
-    for (const BatchPatch& patch : batch.patch) vertices += patch.mesh().vertexCount();
-    batch.vertex.resize(vertices);
+    batch.vertex.resize(batch.vertices);
     ScreenVertex* vertex = batch.vertex.data();
     for (BatchPatch& patch : batch.patch) {
         patch.vertex = vertex;
@@ -288,7 +295,7 @@ void Rasteriser::setModel(const View& view, const Lattice& lattice) {
 
 void Rasteriser::draw(std::span<const DrawPatch> patches) {
     state_->beginBatch();
-    state_->append(patches);
+    state_->draw(patches, false);
     state_->drawBatch(false);
 }
 
@@ -296,7 +303,7 @@ void Rasteriser::draw(std::span<const ModelPatches> models, bool leave_out_hidde
     state_->beginBatch();
     for (const ModelPatches& m : models) {
         setModel(m.view, *m.lattice);
-        state_->append(m.patches);
+        state_->draw(m.patches, leave_out_hidden);
     }
     state_->drawBatch(leave_out_hidden);
 }
