@@ -17,6 +17,7 @@ namespace {
 /// How far ahead the camera is predicted, seconds, and the share of the tolerance that prefetching
 /// goes to where it stands.
 constexpr double kLookahead = 0.5, kNextLevel = 0.5;
+constexpr uint32_t kPrefetchFrames = 4;
 /// Of the budget: below this the tolerance comes down again.
 constexpr double kComfortable = 0.8;
 /// By which the tolerance goes up in a frame that lacks memory, and down in one that has it.
@@ -53,6 +54,8 @@ private:
     void select(const FrameRequest& request);
     void wantMissing();
     void prefetch(const FrameRequest& request);
+    Camera cameraAhead(const FrameRequest& request) const;
+    std::vector<PageKey> pagesFor(const Camera& camera, const FrameRequest& request, double share);
     void adaptTolerance();
     bool mayBeInside(uint32_t m, const View& view);
     void describe(const SceneModel& model, uint32_t m, bool show_error, ModelFrame& out) const;
@@ -70,7 +73,8 @@ private:
     Camera last_camera_;
     double last_seconds_ = -std::numeric_limits<double>::infinity();
     Frame frame_;
-    Selection scratch_;
+    std::vector<PageKey> ahead_, next_level_;  // to be prefetched
+    std::vector<PageRequest> requests_;        // scratch
 };
 
 size_t Scene::Impl::tablesOf(const std::vector<const ModelReader*>& readers) {
@@ -143,8 +147,18 @@ void Scene::Impl::wantMissing() {
     for (const PageKey& key : missing_for_eye_) pages_.want(key, Need::kEye);
 }
 
-/// For where the camera will be in half a second, and for the next level where it is.
+/// For where the camera will be in half a second, and for the next level where it is: these change
+/// little from frame to frame, so that each is looked up anew in one frame of kPrefetchFrames.
 void Scene::Impl::prefetch(const FrameRequest& request) {
+    const uint32_t turn = frame_number_ % kPrefetchFrames;
+    if (turn == 0) ahead_ = pagesFor(cameraAhead(request), request, 1);
+    if (turn == kPrefetchFrames / 2) next_level_ = pagesFor(request.camera, request, kNextLevel);
+    for (const auto* pages : {&ahead_, &next_level_})
+        for (const PageKey& key : *pages)
+            if (!models_[key.model]->residency.resident(key.page)) pages_.want(key, Need::kLater);
+}
+
+Camera Scene::Impl::cameraAhead(const FrameRequest& request) const {
     const double dt = request.seconds - last_seconds_;
     Camera ahead = request.camera;
     if (dt > 0 && dt < kLookahead) {
@@ -153,16 +167,22 @@ void Scene::Impl::prefetch(const FrameRequest& request) {
         ahead.target += (request.camera.target - last_camera_.target) * steps;
         if (ahead.eye == ahead.target) ahead = request.camera;
     }
-    const double pixels = request.pixels * tolerance_factor_;
+    return ahead;
+}
+
+/// That a frame from there would lack, and this one does not.
+std::vector<PageKey> Scene::Impl::pagesFor(const Camera& camera, const FrameRequest& request,
+                                           double share) {
+    std::vector<PageKey> pages;
     for (uint32_t m = 0; m < models_.size(); ++m) {
         SceneModel& model = *models_[m];
-        scratch_.requests.clear();
-        model.refiner.prefetch(View(ahead, request.size, model.reader.info().lattice), pixels,
-                               request.culling, scratch_.requests);
-        model.refiner.prefetch(frame_.models[m].view, pixels * kNextLevel, request.culling,
-                               scratch_.requests);
-        for (const PageRequest& r : scratch_.requests) pages_.want({m, r.page}, Need::kLater);
+        requests_.clear();
+        model.refiner.prefetch(View(camera, request.size, model.reader.info().lattice),
+                               request.pixels * tolerance_factor_ * share, request.culling,
+                               requests_);
+        for (const PageRequest& r : requests_) pages.push_back({m, r.page});
     }
+    return pages;
 }
 
 void Scene::Impl::adaptTolerance() {
