@@ -10,6 +10,7 @@
 #include "base/progress.h"
 #include "base/stopwatch.h"
 #include "runtime/page_pool.h"
+#include "runtime/scene_tolerance.h"
 
 namespace pietra {
 namespace {
@@ -18,10 +19,6 @@ namespace {
 /// goes to where it stands.
 constexpr double kLookahead = 0.5, kNextLevel = 0.5;
 constexpr uint32_t kPrefetchFrames = 4;
-/// Of the budget: below this the tolerance comes down again.
-constexpr double kComfortable = 0.8;
-/// By which the tolerance goes up in a frame that lacks memory, and down in one that has it.
-constexpr double kRaise = 1.1, kLower = 0.99, kMostRaised = 1 << 20;
 
 }  // namespace
 
@@ -36,11 +33,11 @@ public:
         : models_(makeModels(readers)),
           table_bytes_(tablesOf(readers)),
           pages_(models_, settings.ram_bytes, table_bytes_, settings.loader_threads,
-                 settings.sink) {}
+                 settings.sink) {
+        last_.seconds = -std::numeric_limits<double>::infinity();
+    }
 
     const Frame& update(const FrameRequest& request);
-    bool idle() const { return !pages_.blocked() && pages_.missing() == 0; }
-    bool stuck() const { return pages_.blocked() && tolerance_factor_ >= kMostRaised; }
     const std::vector<std::string>& faults() const { return pages_.faults(); }
 
 private:
@@ -56,7 +53,6 @@ private:
     void prefetch(const FrameRequest& request);
     Camera cameraAhead(const FrameRequest& request) const;
     std::vector<PageKey> pagesFor(const Camera& camera, const FrameRequest& request, double share);
-    void adaptTolerance();
     bool mayBeInside(uint32_t m, const View& view);
     void describe(const SceneModel& model, uint32_t m, bool show_error, ModelFrame& out) const;
 
@@ -68,10 +64,9 @@ private:
     std::vector<NodeIndex> cut_for_eye_;    // what tells where the eye is
     std::vector<PageIndex> pages_for_eye_;  // that hold it
     size_t used_bytes_ = 0;                 // of the pages that this frame needs and has
-    double tolerance_factor_ = 1;
+    SceneTolerance tolerance_;
     uint32_t frame_number_ = PageMemory::kFramesKept;
-    Camera last_camera_;
-    double last_seconds_ = -std::numeric_limits<double>::infinity();
+    FrameRequest last_;
     Frame frame_;
     std::vector<PageKey> ahead_, next_level_;  // to be prefetched
     std::vector<PageRequest> requests_;        // scratch
@@ -98,10 +93,15 @@ const Frame& Scene::Impl::update(const FrameRequest& request) {
     wantMissing();
     if (request.prefetch) prefetch(request);
     pages_.load();
-    frame_.converged = pages_.missing() == 0 && tolerance_factor_ == 1;
-    adaptTolerance();
-    last_camera_ = request.camera;
-    last_seconds_ = request.seconds;
+    frame_.raised = tolerance_.factor() > 1;
+    frame_.converged = pages_.missing() == 0 && !frame_.raised;
+    tolerance_.adapt({.same_request = last_.sameView(request),
+                      .blocked = pages_.blocked(),
+                      .missing = pages_.missing(),
+                      .used = used_bytes_,
+                      .budget = pages_.drawn().budget});
+    frame_.settled = tolerance_.settled();
+    last_ = request;
     frame_.resident_bytes = pages_.ramBytes() + table_bytes_;
     frame_.device_bytes = pages_.deviceBytes();
     frame_.bytes_read = pages_.bytesRead();
@@ -112,7 +112,7 @@ const Frame& Scene::Impl::update(const FrameRequest& request) {
 void Scene::Impl::select(const FrameRequest& request) {
     missing_.clear();
     missing_for_eye_.clear();
-    const double pixels = request.pixels * tolerance_factor_;
+    const double pixels = request.pixels * tolerance_.factor();
     frame_.tolerance_px = request.pixels;
     frame_.triangles = frame_.patch_count = used_bytes_ = 0;
     for (uint32_t m = 0; m < models_.size(); ++m) {
@@ -159,12 +159,12 @@ void Scene::Impl::prefetch(const FrameRequest& request) {
 }
 
 Camera Scene::Impl::cameraAhead(const FrameRequest& request) const {
-    const double dt = request.seconds - last_seconds_;
+    const double dt = request.seconds - last_.seconds;
     Camera ahead = request.camera;
     if (dt > 0 && dt < kLookahead) {
         const double steps = kLookahead / dt;
-        ahead.eye += (request.camera.eye - last_camera_.eye) * steps;
-        ahead.target += (request.camera.target - last_camera_.target) * steps;
+        ahead.eye += (request.camera.eye - last_.camera.eye) * steps;
+        ahead.target += (request.camera.target - last_.camera.target) * steps;
         if (ahead.eye == ahead.target) ahead = request.camera;
     }
     return ahead;
@@ -178,19 +178,11 @@ std::vector<PageKey> Scene::Impl::pagesFor(const Camera& camera, const FrameRequ
         SceneModel& model = *models_[m];
         requests_.clear();
         model.refiner.prefetch(View(camera, request.size, model.reader.info().lattice),
-                               request.pixels * tolerance_factor_ * share, request.culling,
+                               request.pixels * tolerance_.factor() * share, request.culling,
                                requests_);
         for (const PageRequest& r : requests_) pages.push_back({m, r.page});
     }
     return pages;
-}
-
-void Scene::Impl::adaptTolerance() {
-    if (pages_.blocked())
-        tolerance_factor_ = std::min(tolerance_factor_ * kRaise, kMostRaised);
-    else if (pages_.missing() == 0 &&
-             double(used_bytes_) < kComfortable * double(pages_.drawn().budget))
-        tolerance_factor_ = std::max(1.0, tolerance_factor_ * kLower);
 }
 
 /// Whatever is not known counts as inside.
@@ -257,8 +249,8 @@ const Frame& Scene::converge(const FrameRequest& request) {
     for (;;) {
         if (Progress::cancelRequested()) throw Interrupted();
         const Frame& frame = impl_->update(request);
-        if (impl_->idle() || impl_->stuck()) return frame;
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        if (frame.settled) return frame;
+        std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
 }
 

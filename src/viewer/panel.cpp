@@ -57,7 +57,9 @@ void drawFigures(const FrameFigures& figures) {
     text(fmt::format("read {}", formatBytes(figures.bytes_read)));
     text(fmt::format("drawn by {}", figures.renderer));
     text(fmt::format("within {:.3g} px{}", figures.tolerance_px,
-                     figures.converged ? "" : ", loading"));
+                     !figures.settled          ? ", loading"
+                     : figures.short_of_memory ? ": no memory for more"
+                                               : ""));
 }
 
 void drawSettings(ViewState& state, const CameraControl& control) {

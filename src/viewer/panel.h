@@ -37,7 +37,8 @@ struct FrameFigures {
     double draw_ms = 0;
     double gpu_ms = 0;  ///< by the GPU's own clock; 0: not known
     double tolerance_px = 0;
-    bool converged = false;
+    bool settled = false;          ///< this is what will be seen at rest
+    bool short_of_memory = false;  ///< for the tolerance asked for
     uint64_t triangles = 0, patches = 0;
     size_t resident_bytes = 0, ram_bytes = 0;
     size_t device_bytes = 0, vram_bytes = 0;  ///< there is none if 0

@@ -45,7 +45,7 @@ public:
           settings_(settings),
           screen_(openScreen()),
           control_(wholeScene(Box3d{{Vec3d(0)}, {Vec3d(1)}})) {
-        nothing_.converged = true;
+        nothing_.settled = true;
         if (!settings.script.empty()) script_ = Script(settings.script);
         showModels();
         state_.pixels = settings.pixels;
@@ -89,7 +89,7 @@ private:
     void touch() { touched_.restart(); }
     bool moving() const { return touched_.seconds() < kAtRestSeconds; }
     /// The picture on the screen is the one asked for.
-    bool ready() const { return picture_size_.width > 0 && figures_.converged && !moving(); }
+    bool ready() const { return picture_size_.width > 0 && figures_.settled && !moving(); }
 
     void drawScene();
     ShadeSettings shade() const;
@@ -464,7 +464,8 @@ void Viewer::drawScene() {
     screen_->renderer().draw(list, {shade(), state_.samples, request.culling.occlusion});
     figures_.draw_ms = watch.ms();
     figures_.tolerance_px = frame.tolerance_px;
-    figures_.converged = frame.converged && motion_factor_ == 1;
+    figures_.settled = frame.settled && motion_factor_ == 1;
+    figures_.short_of_memory = frame.raised;
     figures_.triangles = frame.triangles;
     figures_.patches = frame.patch_count;
     figures_.gpu_ms = screen_->renderer().gpuMs();

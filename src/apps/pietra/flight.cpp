@@ -104,6 +104,7 @@ private:
         record.device_bytes = frame.device_bytes;
         record.tolerance_px = frame.tolerance_px;
         record.converged = frame.converged;
+        record.settled = frame.settled;
         if (record_.first_image_ms < 0 && record.tolerance_px <= kFirstImagePx)
             record_.first_image_ms = msSinceStart();
         return record;
@@ -132,10 +133,9 @@ private:
         FrameRequest last = request(settings_.frames - 1);
         while (stopped.ms() < kMostWaitMs) {
             last.seconds += 1.0 / 60;
-            if (frame(last).converged) {
-                record_.converged_ms = stopped.ms();
-                return;
-            }
+            const FrameRecord found = frame(last);
+            if (found.converged) record_.converged_ms = stopped.ms();
+            if (found.settled) return;
         }
     }
 
