@@ -20,7 +20,8 @@ struct ViewState {
     Show show = Show::kShaded;
     bool prefetch = true;
     bool show_panel = true, show_help = false;
-    bool frozen = false;  ///< what is drawn stays as selected, wherever the camera goes
+    bool frozen = false;       ///< what is drawn stays as selected, wherever the camera goes
+    bool show_hidden = false;  ///< when frozen: what others hide red, all else green
     ShowSpheres spheres = ShowSpheres::kNone;  ///< of the nodes drawn
     bool recording = false;
     bool measuring = false;

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "apps/pietra/camera_options.h"
 #include "apps/pietra/draw_options.h"
 #include "apps/pietra/limits.h"
 #include "apps/pietra/logging.h"
@@ -30,7 +29,7 @@ private:
     PictureSize size_{1280, 800};
     double pixels_ = 1;
     std::string renderer_ = "auto";
-    CameraOptions camera_;
+    std::string up_ = "auto";
     std::string script_;
     uint64_t ram_ = uint64_t(1) << 30, vram_ = uint64_t(1) << 30;
     std::optional<uint64_t> jobs_;
@@ -60,7 +59,8 @@ void ViewVerb::declare(OptionSet& options) {
     options.number("--pixels", "T", pixels_, {.min = 0.25, .max = 64}, "Tolerance in pixels.");
     options.choice("--renderer", renderer_, {"auto", "gl", "cpu"},
                    "What draws; auto: OpenGL where a graphics card does it, else the processor.");
-    camera_.declareUp(options, "Which axis points up.");
+    options.choice("--up", up_, {"auto", "y", "z"},
+                   "Which axis points up; auto: what the models seem to stand on.");
     options.size("--ram", ram_, "Most memory for what is loaded.");
     declareVram(options, vram_);
     options.text(
@@ -79,7 +79,7 @@ int ViewVerb::run(const RunContext& context) {
     ViewerSettings settings;
     settings.size = size_;
     settings.pixels = pixels_;
-    settings.up = camera_.up();
+    if (up_ != "auto") settings.up = up_ == "y" ? UpAxis::kY : UpAxis::kZ;
     settings.scene.ram_bytes = size_t(ram_);
     settings.vram_bytes = size_t(vram_);
     settings.renderer = renderer_ == "auto" ? ViewerRenderer::kAuto

@@ -56,6 +56,7 @@ struct Rasteriser::State {
     Picture picture;
     Batch batch;
     std::vector<uint8_t> drawn;  // a patch of the batch: not left out, set by any thread
+    std::vector<uint32_t>* hidden = nullptr;  // takes the ids of those left out
     RasterStatistics statistics;
 
     State(const View& v, const Lattice& lattice, int sample_count, const ShadeSettings& s)
@@ -148,7 +149,11 @@ void Rasteriser::State::drawBatch(bool leave_out_hidden) {
     statistics.triangles += batch.triangles;
     statistics.patches += batch.patch.size();
     for (size_t i = 0; i < drawn.size(); ++i)
-        if (!drawn[i]) statistics.triangles_hidden += batch.patch[i].mesh().triangleCount();
+        if (!drawn[i]) {
+            statistics.triangles_hidden += batch.patch[i].mesh().triangleCount();
+            if (hidden != nullptr && !batch.patch[i].box.empty())
+                hidden->push_back(batch.patch[i].patch->id);
+        }
 }
 
 void Rasteriser::State::transform(BatchPatch& entry) const {
@@ -299,13 +304,16 @@ void Rasteriser::draw(std::span<const DrawPatch> patches) {
     state_->drawBatch(false);
 }
 
-void Rasteriser::draw(std::span<const ModelPatches> models, bool leave_out_hidden) {
+void Rasteriser::draw(std::span<const ModelPatches> models, bool leave_out_hidden,
+                      std::vector<uint32_t>* hidden) {
+    state_->hidden = hidden;
     state_->beginBatch();
     for (const ModelPatches& m : models) {
         setModel(m.view, *m.lattice);
         state_->draw(m.patches, leave_out_hidden);
     }
     state_->drawBatch(leave_out_hidden);
+    state_->hidden = nullptr;
 }
 
 const Picture& Rasteriser::finish() {

@@ -69,8 +69,9 @@ public:
     void draw(std::span<const DrawPatch> patches);
     /// Draws the models as one after the other; the last one stays set. Patches that are hidden, by
     /// what is drawn already or by each other, may be left out: this changes no pixel, and costs
-    /// next to nothing where none are.
-    void draw(std::span<const ModelPatches> models, bool leave_out_hidden);
+    /// next to nothing where none are. Appends the ids of those left out to `hidden`.
+    void draw(std::span<const ModelPatches> models, bool leave_out_hidden,
+              std::vector<uint32_t>* hidden = nullptr);
     /// Completes the picture, which is valid until restart(); nothing can be drawn in between.
     const Picture& finish();
 
