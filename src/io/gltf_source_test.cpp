@@ -16,18 +16,9 @@ namespace pietra {
 namespace {
 
 using Json = nlohmann::json;
-using Soup = std::vector<std::array<Vec3d, 3>>;
 
 float noise(uint64_t i) {
     return float(int64_t(mixBits(i + 1)) >> 40) * 0x1p-23f;
-}
-
-Soup soupOf(const WholeMesh& mesh) {
-    Soup soup;
-    for (const auto& t : mesh.triangles)
-        soup.push_back({mesh.vertices.position[t[0]], mesh.vertices.position[t[1]],
-                        mesh.vertices.position[t[2]]});
-    return soup;
 }
 
 template <class T>

@@ -63,6 +63,17 @@ inline WholeMesh readWhole(const std::string& path) {
     return readWhole(*openSource({path}));
 }
 
+/// The corners of triangles, which do not know of each other.
+using Soup = std::vector<std::array<Vec3d, 3>>;
+
+inline Soup soupOf(const WholeMesh& mesh) {
+    Soup soup;
+    for (const auto& t : mesh.triangles)
+        soup.push_back({mesh.vertices.position[t[0]], mesh.vertices.position[t[1]],
+                        mesh.vertices.position[t[2]]});
+    return soup;
+}
+
 inline void expectSameMesh(const WholeMesh& a, const WholeMesh& b) {
     EXPECT_EQ(a.schema, b.schema);
     EXPECT_EQ(a.vertices.position, b.vertices.position);
