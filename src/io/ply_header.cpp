@@ -83,11 +83,15 @@ private:
     std::vector<std::string_view> words_;
 };
 
-/// A word as it may stand in a message: printable and short.
+/// A word as it may stand in a message: short, and nothing that moves the cursor.
+std::string printable(std::string_view word) {
+    std::string text(word.substr(0, 40));
+    for (char& c : text)
+        if (c < 32 || c > 126) c = '?';
+    return text + (word.size() > 40 ? "..." : "");
+}
 std::string quoted(std::string_view word) {
-    std::string text = "\"";
-    for (const char c : word.substr(0, 40)) text += c >= 32 && c < 127 ? c : '?';
-    return text + (word.size() > 40 ? "...\"" : "\"");
+    return '"' + printable(word) + '"';
 }
 
 PlyType parseType(const HeaderLines& lines, std::string_view word) {
@@ -179,6 +183,16 @@ const PlyElement* PlyHeader::find(const std::string& wanted) const {
     return nullptr;
 }
 
+std::string leftOut(const char* kind, const std::vector<std::string>& names) {
+    constexpr size_t kMost = 8;
+    std::string list;
+    for (size_t i = 0; i < std::min(names.size(), kMost); ++i)
+        list += (i == 0 ? "" : i + 1 == names.size() ? " and " : ", ") + printable(names[i]);
+    if (names.size() > kMost) list += fmt::format(" and {} others", names.size() - kMost);
+    return names.size() == 1 ? fmt::format("{} {} is left out", kind, list)
+                             : fmt::format("{}s {} are left out", kind, list);
+}
+
 PlyHeader readPlyHeader(ByteReader& reader) {
     HeaderLines lines(reader);
     PlyHeader header;
@@ -192,7 +206,11 @@ PlyHeader readPlyHeader(ByteReader& reader) {
         if (lines.words().empty()) continue;
         const std::string_view word = lines.words()[0];
         if (word == "end_header") break;
-        if (word == "comment" || word == "obj_info") continue;
+        if (word == "comment" || word == "obj_info") {
+            if (lines.words().size() > 2 && lines.words()[1] == "TextureFile")
+                header.names_textures = true;
+            continue;
+        }
         if (word == "format") {
             header.encoding = parseFormat(lines);
             has_format = true;

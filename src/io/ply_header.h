@@ -61,12 +61,17 @@ struct PlyHeader {
     std::vector<PlyElement> elements;  ///< in the order of the file
     uint64_t body_offset = 0;          ///< of the first byte after the header
     uint64_t body_line = 0;            ///< its line, from 1
+    bool names_textures = false;       ///< a comment does, as some programs have it
 
     const PlyElement* find(const std::string& name) const;
 };
 
 /// Longest header that is read; one without an end is not searched for further than this.
 inline constexpr size_t kMaxPlyHeader = ByteReader::kWindow;
+
+/// "element a is left out", or "elements a, b and 7 others are left out"; names as messages show
+/// them. At least one.
+std::string leftOut(const char* kind, const std::vector<std::string>& names);
 
 /// Parses the header at the start of `reader`.
 PlyHeader readPlyHeader(ByteReader& reader);

@@ -119,7 +119,7 @@ TEST(StlSource, facetsMayBeSpelledInTurns) {
                                   " 1.2\n3 4 ",
                                   " 1.20000000000 3.00000000 4",
                                   " 1.20000000000 3.00000000 40",
-                                  " 1.20000000000 3.00000000 4.5",
+                                  " 1.20000000000 3.00000000 5",
                                   "  1.20000000000000000000000000000000000000001 3 -0"};
     const std::string ends[] = {"\nendloop\nendfacet\n", "\n\n endloop\r\nendfacet ",
                                 "\nENDLOOP\n endfacet\n"};
