@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "io/notes.h"
 
 namespace pietra {
 

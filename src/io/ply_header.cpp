@@ -9,6 +9,7 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "io/file_signs.h"
+#include "io/notes.h"
 
 namespace pietra {
 
@@ -83,13 +84,6 @@ private:
     std::vector<std::string_view> words_;
 };
 
-/// A word as it may stand in a message: short, and nothing that moves the cursor.
-std::string printable(std::string_view word) {
-    std::string text(word.substr(0, 40));
-    for (char& c : text)
-        if (c < 32 || c > 126) c = '?';
-    return text + (word.size() > 40 ? "..." : "");
-}
 std::string quoted(std::string_view word) {
     return '"' + printable(word) + '"';
 }
@@ -181,16 +175,6 @@ const PlyElement* PlyHeader::find(const std::string& wanted) const {
     for (const PlyElement& e : elements)
         if (e.name == wanted) return &e;
     return nullptr;
-}
-
-std::string leftOut(const char* kind, const std::vector<std::string>& names) {
-    constexpr size_t kMost = 8;
-    std::string list;
-    for (size_t i = 0; i < std::min(names.size(), kMost); ++i)
-        list += (i == 0 ? "" : i + 1 == names.size() ? " and " : ", ") + printable(names[i]);
-    if (names.size() > kMost) list += fmt::format(" and {} others", names.size() - kMost);
-    return names.size() == 1 ? fmt::format("{} {} is left out", kind, list)
-                             : fmt::format("{}s {} are left out", kind, list);
 }
 
 PlyHeader readPlyHeader(ByteReader& reader) {

@@ -69,10 +69,6 @@ struct PlyHeader {
 /// Longest header that is read; one without an end is not searched for further than this.
 inline constexpr size_t kMaxPlyHeader = ByteReader::kWindow;
 
-/// "element a is left out", or "elements a, b and 7 others are left out"; names as messages show
-/// them. At least one.
-std::string leftOut(const char* kind, const std::vector<std::string>& names);
-
 /// Parses the header at the start of `reader`.
 PlyHeader readPlyHeader(ByteReader& reader);
 

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "io/notes.h"
 #include "io/ply_cursor.h"
 #include "io/ply_faces.h"
 #include "io/ply_header.h"

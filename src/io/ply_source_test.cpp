@@ -306,7 +306,7 @@ TEST(PlySource, namesWhatIsLeftOutInFewWords) {
     const ScratchDirectory dir;
     EXPECT_EQ(readWhole(dir.write("a.ply", head + rows + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")).notes,
               (std::vector<std::string>{
-                  "elements ?[31m, e0, e1, e2, e3, e4, e5, e6 and 13 others are left out"}));
+                  "elements ?[31m, e0, e1, e2, e3, e4, e5, e6, e7 and 12 others are left out"}));
 }
 
 TEST(PlySource, fansLongPolygonsAcrossBatches) {
