@@ -1,5 +1,6 @@
 #include "runtime/page_loader.h"
 
+#include <sched.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,8 +9,14 @@
 namespace pietra {
 namespace {
 
-/// Where all cores are busy, drawing goes before loading, but does not starve it.
-constexpr int kNiceness = 10;
+/// Where all cores are busy, drawing goes before loading, but does not starve it; and what is woken
+/// to load does not take the core from what wakes it.
+void stayInTheBackground() {
+    constexpr int kNiceness = 10;
+    [[maybe_unused]] const int level = ::nice(kNiceness);  // on Linux, of this thread alone
+    const sched_param none{};
+    ::sched_setscheduler(0, SCHED_BATCH, &none);
+}
 
 }  // namespace
 
@@ -66,7 +73,7 @@ bool PageLoader::next(PageKey& key) {
 
 void PageLoader::work() {
     std::vector<std::byte> bytes;
-    [[maybe_unused]] const int level = ::nice(kNiceness);  // on Linux, of this thread alone
+    stayInTheBackground();
     for (PageKey key; next(key);) {
         LoadedPage loaded{key, {}, {}};
         const ModelReader& model = *models_[key.model];

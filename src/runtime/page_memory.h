@@ -40,7 +40,25 @@ public:
                   const Evict& evict);
 
 private:
-    std::optional<std::vector<Victim>> victims_;  // those to leave first come last
+    /// Of two, the one to stay longer.
+    static bool staysLonger(const Victim& a, const Victim& b) {
+        return a.last_used != b.last_used   ? a.last_used > b.last_used
+               : a.key.model != b.key.model ? a.key.model > b.key.model
+                                            : a.key.page > b.key.page;
+    }
+    void push(const Victim& victim) {
+        victims_->push_back(victim);
+        std::push_heap(victims_->begin(), victims_->end(), staysLonger);
+    }
+    Victim pop() {
+        std::pop_heap(victims_->begin(), victims_->end(), staysLonger);
+        const Victim victim = victims_->back();
+        victims_->pop_back();
+        return victim;
+    }
+
+    std::optional<std::vector<Victim>> victims_;  // a heap: those to leave first on top
+    std::vector<Victim> waiting_;                 // may not leave before others
 };
 
 template <class Candidates, class Evict>
@@ -49,21 +67,22 @@ bool PageMemory::makeRoom(size_t bytes, Need need, uint32_t frame, const Candida
     if (fits(bytes)) return true;
     if (!victims_) {
         victims_ = candidates();
-        std::sort(victims_->begin(), victims_->end(), [](const Victim& a, const Victim& b) {
-            return a.last_used != b.last_used   ? a.last_used > b.last_used
-                   : a.key.model != b.key.model ? a.key.model > b.key.model
-                                                : a.key.page < b.key.page;
-        });
+        std::make_heap(victims_->begin(), victims_->end(), staysLonger);
     }
     for (bool again = true; again && !fits(bytes);) {
         again = false;
-        for (size_t i = victims_->size(); i-- > 0 && !fits(bytes);) {
-            const Victim victim = (*victims_)[i];
-            if (need != Need::kDraw && victim.last_used + kFramesKept > frame) break;
-            if (!evict(victim.key)) continue;
-            victims_->erase(victims_->begin() + ptrdiff_t(i));
-            again = true;
+        while (!victims_->empty() && !fits(bytes)) {
+            const Victim victim = pop();
+            const bool too_soon = need != Need::kDraw && victim.last_used + kFramesKept > frame;
+            if (!too_soon && evict(victim.key)) {
+                again = true;
+                continue;
+            }
+            waiting_.push_back(victim);
+            if (too_soon) break;
         }
+        for (const Victim& victim : waiting_) push(victim);
+        waiting_.clear();
     }
     return fits(bytes);
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "base/parallel.h"
 #include "base/progress.h"
 #include "base/stopwatch.h"
 #include "runtime/page_pool.h"
@@ -212,8 +213,15 @@ bool Scene::Impl::mayBeInside(uint32_t m, const View& view) {
         if (!model.hasCopy(page)) missing_for_eye_.push_back({m, page});
     }
     if (missing_for_eye_.size() > missing_before) return true;
+    constexpr size_t kSlice = 16;
+    const size_t count = cut_for_eye_.size();
+    std::vector<EyeSide> parts((count + kSlice - 1) / kSlice, EyeSide(view.eye()));
+    parallelFor(parts.size(), [&](size_t k) {
+        for (size_t i = k * kSlice; i < std::min(count, (k + 1) * kSlice); ++i)
+            parts[k].add(model.forest.node(cut_for_eye_[i]), *model.mesh(cut_for_eye_[i]));
+    });
     EyeSide side(view.eye());
-    for (const NodeIndex i : cut_for_eye_) side.add(model.forest.node(i), *model.mesh(i));
+    for (const EyeSide& part : parts) side.add(part);
     model.side = side;
     model.side_departures = departures;
     return side.mayBeInside();
