@@ -33,9 +33,12 @@ void report(const ProgressiveMesh& mesh, const BuildCounts& counts, double secon
     std::printf(
         "  built in %.2f s: base %zu vertices, %zu triangles; %zu operations, %llu dummies;"
         " %u levels; %llu irregular vertices\n",
-        seconds, mesh.base_vertex.size(), mesh.base_triangle.size(), mesh.operation.size(),
+        seconds, mesh.base_vertex.size(), mesh.base_triangle.size(), size_t(counts.operations),
         static_cast<unsigned long long>(counts.dummies), counts.levels,
         static_cast<unsigned long long>(counts.irregular_vertices));
+    std::printf("  %zu nodes, %.1f %% full, %u levels of them\n", counts.row.size(),
+                100.0 * double(counts.operations) / double(counts.row.size() * kNodeSlots),
+                counts.row.empty() ? 0 : counts.row.back().level + 1u);
     std::printf(
         "  refused by valence %llu, by level %llu; %llu ends inexact, by %u steps at most;"
         " resident %zu MiB\n",
