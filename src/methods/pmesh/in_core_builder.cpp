@@ -235,6 +235,7 @@ void Encoder::setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& fro
     o.shift = q.shift;
     o.delta = q.delta;
     for (const int end : {0, 1}) {
+        if (r.child[size_t(end)] != kNoOperation) continue;  // which puts it right
         const Vec3i rest = glm::abs(o.offset(end) - offset[size_t(end)]);
         const uint32_t largest = uint32_t(std::max({rest.x, rest.y, rest.z}));
         counts_.inexact_ends += largest != 0;

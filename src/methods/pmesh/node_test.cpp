@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "methods/pmesh/node_codec.h"
 #include "methods/pmesh/node_packer.h"
 #include "methods/pmesh/pmesh_testing.h"
 
@@ -64,6 +65,23 @@ TEST_P(EachForest, ANodeIsNeededBeforeAnythingInItOrBelow) {
                     centre[o.childOf(end)] = centre[id] + o.offset(end);
         }
     }
+}
+
+TEST_P(EachForest, SurvivesItsCodec) {
+    const Built built = buildFor(GetParam().make());
+    const NodeForest forest = toNodes(built.mesh, built.counts.row);
+    std::string fault;
+    for (NodeIndex n = 0; n < forest.node.size(); ++n) {
+        OperationNode node;
+        ASSERT_TRUE(decodeNode(encodeNode(forest.node[n]), n, forest.row[n], node, fault)) << fault;
+        EXPECT_EQ(node, forest.node[n]);
+    }
+    NodeForest base;
+    base.row = forest.row;
+    ASSERT_TRUE(decodeBase(encodeBase(forest), base, fault)) << fault;
+    EXPECT_EQ(base.base_vertex, forest.base_vertex);
+    EXPECT_EQ(base.base_triangle, forest.base_triangle);
+    EXPECT_EQ(base.base_operation, forest.base_operation);
 }
 
 /// A tree of operations along a line, each with two children as long as there are any left.

@@ -63,7 +63,7 @@ void boundRows(const ProgressiveMesh& mesh, NodeForest& forest) {
                                                    forest.node[n].frontier);
         Box3i box;
         for (uint32_t s = 0; s < above.size(); ++s) box.add(centre[operationId(n, s)]);
-        row.centre = (box.min + box.max) >> 1;
+        row.centre = box.empty() ? Vec3i(0) : (box.min + box.max) >> 1;
         uint32_t radius = 0;
         row.error = 0;
         const auto enclose = [&](const Vec3i& c, uint32_t radius_code, uint8_t error) {
@@ -92,6 +92,50 @@ Operation toOperation(NodeIndex node, const NodeRow& row, const NodeOperation& n
     o.delta = n.delta;
     o.normal = n.normal;
     return o;
+}
+
+Node tableNode(NodeIndex index, const NodeRow& row, const OperationNode& node, int lattice_shift) {
+    const auto step = float(1 << lattice_shift);
+    Node n;
+    n.saturated = {Vec3f(row.centre) * step, float(decodeRadius(row.radius)) * step};
+    n.bounds = n.saturated;
+    n.error = float(decodeError(row.error)) * float(kErrorUnit) * step;
+    n.child[0] = row.child[0];
+    n.child[1] = row.child[1];
+    n.group = index;
+    n.level = row.level;
+    n.vertices = uint32_t(node.operation.size());
+    for (const NodeOperation& o : node.operation)
+        n.triangles += ((o.ranks & 15u) != kNoRank) + ((o.ranks >> 4) != kNoRank);
+    return n;
+}
+
+std::vector<NodeRow> rowsOf(std::span<const Node> table, int lattice_shift) {
+    const float step = float(1 << lattice_shift), most = 1 << 23;
+    // Of a file of unknown origin: anything may stand there.
+    const auto whole = [&](float x, float scale) {
+        const float y = x / (step * scale);
+        return y >= -most && y <= most ? int32_t(y) : 0;
+    };
+    std::vector<NodeRow> rows(table.size());
+    for (NodeIndex i = 0; i < table.size(); ++i) {
+        const Node& n = table[i];
+        NodeRow& row = rows[i];
+        row.child = {n.child[0], n.child[1]};
+        for (const NodeIndex c : row.child)
+            if (c != kNoNode) rows[c].parent = i;
+        row.operations = n.vertices;
+        row.level = n.level;
+        const Vec3f& c = n.saturated.centre;
+        row.centre = {whole(c.x, 1), whole(c.y, 1), whole(c.z, 1)};
+        row.radius =
+            uint16_t(encodeRoundedUp<11>(uint64_t(std::max(whole(n.saturated.radius, 1), 0))));
+        const double units = double(n.error) / (double(step) * kErrorUnit);
+        row.error = units >= double(decodeError(kMaxErrorCode))
+                        ? uint8_t(kMaxErrorCode)
+                        : uint8_t(encodeRoundedUp<3>(units > 0 ? uint64_t(units) : 0));
+    }
+    return rows;
 }
 
 NodeForest toNodes(const ProgressiveMesh& mesh, std::vector<NodeRow> rows) {

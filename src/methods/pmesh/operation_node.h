@@ -122,6 +122,11 @@ struct NodeForest {
     std::vector<OperationNode> node;
 };
 
+/// As a file's table of nodes has it, and back; both lose nothing but the bounds, which there are
+/// the sphere. Node::vertices counts operations, Node::triangles what they add to the mesh.
+Node tableNode(NodeIndex index, const NodeRow& row, const OperationNode& node, int lattice_shift);
+std::vector<NodeRow> rowsOf(std::span<const Node> table, int lattice_shift);
+
 /// Splits a mesh whose ids are those of nodes into these, and back. Of each row, parent, child,
 /// operations and level are given (node_packer.h), the rest is computed.
 NodeForest toNodes(const ProgressiveMesh& mesh, std::vector<NodeRow> row);

@@ -15,7 +15,8 @@ std::string faultOf(const Operation& o) {
     if (o.level > kMaxLevel)
         return fmt::format("its level is {}, the largest is {}", o.level, kMaxLevel);
     if (o.radius > kMaxRadiusCode) return fmt::format("its radius has the code {}", o.radius);
-    if (o.shift > 20) return fmt::format("its deltas are shifted by {}", o.shift);
+    if (o.shift > (o.isDummy() ? 0 : 20))
+        return fmt::format("its deltas are shifted by {}", o.shift);
     if (o.rankLeft() == o.rankRight() && !o.isDummy()) return "its neighbours have equal ranks";
     return "";
 }
