@@ -50,7 +50,8 @@ std::string Model::load(Budget& budget) {
     if (loaded_) return "";
     uint64_t operations = 0;
     for (const NodeRow& row : forest_.row) operations += row.operations;
-    memory_ = budget.reserve(kModelBytes * operations, "a progressive mesh, whole in memory,");
+    memory_ = budget.reserve(kModelBytes * (operations + forest_.base_vertex.size()),
+                             "a progressive mesh, whole in memory,");
     forest_.node.resize(forest_.row.size());
     std::vector<std::string> fault(forest_.row.size());
     parallelFor(forest_.row.size(), [&](size_t n) {

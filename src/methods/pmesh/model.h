@@ -3,7 +3,7 @@
 // adaptive_model.h). Cuts are made by the same adaption as at run time (adaption.h), from the base,
 // and so depend on file and request alone.
 //
-// Memory: kModelBytes an operation, or MemoryError.
+// Memory: kModelBytes an operation or base vertex, or MemoryError.
 
 #include <memory>
 

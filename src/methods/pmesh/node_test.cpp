@@ -195,5 +195,37 @@ TEST(DamagedNode, IsRefusedWithAMessage) {
               "operation 4: its criteria exceed its parent's");
 }
 
+/// What is accepted keeps its rules, whatever the bytes.
+TEST(DamagedNode, IsRefusedOrSound) {
+    const Built built = buildFor(onLattice(dented(test::sphereShape(24), 0.01), 900));
+    const NodeForest forest = toNodes(built.mesh, built.counts.row);
+    std::mt19937 random(21);
+    std::string fault;
+    uint32_t refused = 0;
+    for (int i = 0; i < 3000; ++i) {
+        const NodeIndex n = NodeIndex(random() % forest.node.size());
+        std::vector<std::byte> bytes = encodeNode(forest.node[n]);
+        if (random() % 4 == 0) bytes.resize(random() % bytes.size());
+        for (uint32_t k = random() % 4; k > 0 && !bytes.empty(); --k)
+            bytes[random() % std::min<size_t>(bytes.size(), random() % 2 ? 100 : 20000)] =
+                std::byte(random());
+        OperationNode node;
+        if (!decodeNode(bytes, n, forest.row[n], node, fault)) {
+            EXPECT_NE(fault, "");
+            ++refused;
+            continue;
+        }
+        EXPECT_EQ(faultOf(n, forest.row[n], node), "");
+        bytes = encodeBase(forest);
+        bytes[random() % bytes.size()] = std::byte(random());
+        NodeForest base;
+        base.row = forest.row;
+        if (decodeBase(bytes, base, fault)) {
+            EXPECT_EQ(base.base_operation.size(), base.base_vertex.size());
+        }
+    }
+    EXPECT_GT(refused, 1000u);
+}
+
 }  // namespace
 }  // namespace pietra::pmesh
