@@ -6,15 +6,13 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "methods/pmesh/in_core_builder.h"
+#include "methods/pmesh/diamond_collapses.h"
+#include "methods/pmesh/encoder.h"
 #include "methods/pmesh/node_codec.h"
-#include "methods/pmesh/whole_mesh.h"
 #include "store/model_writer.h"
 
 namespace pietra::pmesh {
 namespace {
-
-constexpr size_t kProgram = size_t(48) << 20;
 
 /// Fine to coarse, as the writer wants them.
 void writeLevels(const NodeForest& forest, ModelWriter& writer, Progress& progress) {
@@ -43,73 +41,76 @@ void writeLevels(const NodeForest& forest, ModelWriter& writer, Progress& progre
     }
 }
 
-WholeMesh read(TriangleSource& source, const BuildSettings& settings, TempSpace& space,
-               Progress& progress) {
-    WholeMesh whole =
-        readWholeMesh(source, settings.input_name, settings.precision, space, progress);
-    if (whole.mesh.triangle.empty())
-        throw InputError(settings.input_name, "",
-                         whole.dropped_degenerate > 0
-                             ? "there is nothing to show: all triangles are degenerate"
-                             : "there is nothing to show: there are no triangles");
-    return whole;
-}
-
-ModelInfo infoOf(const WholeMesh& whole, const BuildSettings& settings, const BuildReport& report,
+ModelInfo infoOf(const InputLeaves& input, const BuildSettings& settings,
                  const BuildCounts& counts) {
+    const Lattice& lattice = input.vertices.lattice();
     ModelInfo info;
     info.method = "pmesh";
-    info.lattice = whole.lattice;
-    info.input_triangles = report.input_triangles;
-    info.input_vertices = report.input_vertices;
+    info.lattice = lattice;
+    info.input_triangles = input.inputTriangles();
+    info.input_vertices = input.vertices.size();
     info.input_files = settings.input_files;
-    info.dropped_degenerate = report.dropped_degenerate;
-    info.dropped_duplicate = report.dropped_duplicate;
-    info.bounds = whole.bounds;
+    info.dropped_degenerate = input.degenerate;
+    info.dropped_duplicate = input.leaves.duplicates;
+    info.bounds = input.vertices.bounds();
     // The finest mesh is the input but for the lattice and what offsets cannot tell.
-    const double rounding = double(counts.largest_error) * double(1 << whole.lattice.shift);
-    info.quantisation_error = float(double(whole.quantisation_error) + 1.7320509 * rounding);
+    const double rounding = double(counts.largest_error) * double(1 << lattice.shift);
+    info.quantisation_error =
+        float(double(input.vertices.quantisationError()) + 1.7320509 * rounding);
     return info;
+}
+
+BuildReport reportOf(TriangleSource& source, const InputLeaves& input, const BuildCounts& counts) {
+    BuildReport report;
+    report.input_triangles = input.inputTriangles();
+    report.input_vertices = input.vertices.size();
+    report.dropped_degenerate = input.degenerate;
+    report.dropped_duplicate = input.leaves.duplicates;
+    report.stored_triangles = input.leaves.triangles;
+    report.border_edges = input.leaves.edges.border;
+    report.non_manifold_edges = input.leaves.edges.non_manifold;
+    report.inconsistent_edges = input.leaves.edges.inconsistent;
+    report.levels = counts.levels;
+    report.nodes = counts.row.size();
+    report.notes = source.notes();
+    if (source.schema().colours || !source.schema().scalars.empty())
+        report.notes.push_back("this method does not carry colours and scalars yet");
+    return report;
 }
 
 }  // namespace
 
 BuildReport build(TriangleSource& source, const BuildSettings& settings, Progress& progress) {
     const ThreadLimit threads(settings.jobs);
-    Budget budget(std::max(settings.memory_bytes, 2 * kProgram) - kProgram);
-    TempSpace space{settings.temp_dir, &budget, budget.limit() / 2};
-    progress.setStages(5);
+    const MemoryPlan plan(settings.memory_bytes, settings.jobs,
+                          VertexRecord(source.schema()).bytes);
+    Budget budget(plan.budget);
+    TempSpace space{settings.temp_dir, &budget, plan.work};
+    progress.setStages(InputLeaves::kStages + 3);
     // Made first: an output that exists or cannot be written is known before any work.
     ModelWriter writer(settings.output, settings.force, settings.temp_dir, budget);
-    WholeMesh whole = read(source, settings, space, progress);
+    InputLeaves input(source,
+                      {settings.input_name, settings.precision, settings.leaf_triangles, true},
+                      plan, space, progress);
+    const Lattice& lattice = input.vertices.lattice();
 
-    BuildReport report;
-    report.dropped_degenerate = whole.dropped_degenerate;
-    report.dropped_duplicate = whole.dropped_duplicate;
-    report.input_triangles =
-        whole.mesh.triangleCount() + whole.dropped_degenerate + whole.dropped_duplicate;
-    report.stored_triangles = whole.mesh.triangleCount();
-    report.input_vertices = whole.input_vertices;
-    report.notes = source.notes();
-    if (source.schema().colours || !source.schema().scalars.empty())
-        report.notes.push_back("this method does not carry colours and scalars yet");
-
-    progress.beginStage("collapse", 0);
     BuildCounts counts;
     NodeForest forest;
     {
-        const ProgressiveMesh mesh =
-            buildInCore(std::move(whole.mesh), whole.lattice, budget, &counts);
+        const Reservation memory = budget.reserve(kEncodeBytes * input.leaves.triangles,
+                                                  "a progressive mesh, encoded in memory,");
+        const Collapses collapses =
+            collapseByDiamonds(input, settings.patch_triangles, settings.jobs, space, progress);
+        progress.beginStage("encode", 0);
+        const ProgressiveMesh mesh = encode(collapses, lattice, counts);
         // A file has a node, if only an empty one.
         if (counts.row.empty()) counts.row.emplace_back();
-        forest = toNodes(mesh, std::move(counts.row));
+        forest = toNodes(mesh, counts.row);
     }
-    report.levels = counts.levels;
-    report.nodes = forest.row.size();
-
+    BuildReport report = reportOf(source, input, counts);
     progress.beginStage("write", forest.row.size());
     writeLevels(forest, writer, progress);
-    writer.finish(infoOf(whole, settings, report, counts), {}, encodeBase(forest));
+    writer.finish(infoOf(input, settings, counts), {}, encodeBase(forest));
     progress.endStage();
     report.output_bytes = std::filesystem::file_size(settings.output);
     report.temp_bytes_peak = space.peak_bytes;

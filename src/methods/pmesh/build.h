@@ -1,7 +1,7 @@
 #pragma once
-// `build --method pmesh`: the whole input onto the lattice, one simplification, its collapses as
-// nodes of operations into a file. In memory so far (in_core_builder.h): MemoryError, with the size
-// needed, where the limit is less.
+// `build --method pmesh`: leaves as for every construction out of core; collapses by diamonds, on
+// all cores; then packed, encoded and written. Encoding still has the whole mesh in memory:
+// MemoryError, with the size needed, where the limit is less.
 
 #include "multires/method.h"
 

@@ -33,7 +33,17 @@ Recorder::Recorder(const Mesh& mesh, std::span<const uint8_t> irregular, int shi
     : irregular_(irregular),
       shift_(shift),
       normal_(mesh.normal),
-      last_(mesh.vertexCount(), kNoOperation) {}
+      history_(mesh.vertexCount()),
+      error_before_(mesh.vertexCount(), 0) {}
+
+Recorder::Recorder(const Mesh& mesh, std::vector<VertexHistory> history, uint32_t first_record,
+                   int shift)
+    : shift_(shift),
+      normal_(mesh.normal),
+      history_(std::move(history)),
+      first_record_(first_record) {
+    for (const VertexHistory& h : history_) error_before_.push_back(h.error);
+}
 
 Vec3i Recorder::stepsOf(const WorkingMesh& mesh, const Vec3f& p) const {
     return (mesh.centre + Vec3i(p)) >> shift_;
@@ -69,7 +79,10 @@ float Recorder::precisionAt(const CollapseStep& step, uint32_t end) const {
 
 void Recorder::push(const CollapseRecord& record) {
     largest_ = std::max(largest_, record.height);
-    last_[record.v] = uint32_t(record_.size());
+    VertexHistory& h = history_[record.v];
+    h.last = first_record_ + uint32_t(record_.size());
+    h.height = record.height;
+    h.error = std::max(h.error, record.deviation);
     record_.push_back(record);
 }
 
@@ -78,7 +91,7 @@ void Recorder::recordDummy(const CollapseStep& step, uint32_t end) {
     r.v = end;
     r.position[0] = stepsOf(step.mesh, step.mesh.point[end].vec());
     r.normal[0] = packNormal(normal_[end]);
-    r.child = {last_[end], kNoOperation};
+    r.child = {history_[end].last, kNoOperation};
     r.height = 0;
     forEdges(step, [&](uint32_t a, uint32_t b) {
         if (a == end || b == end) r.height = std::max({r.height, heightOf(a), heightOf(b)});
@@ -91,9 +104,10 @@ void Recorder::recordDummy(const CollapseStep& step, uint32_t end) {
 
 bool Recorder::take(const CollapseStep& step) {
     const uint32_t u = step.u, v = step.v;
-    if (irregular_[u] || irregular_[v]) return ++refused_.irregular, false;
-    const bool open =
-        step.mesh.point[u].rank() != kRankFree || step.mesh.point[v].rank() != kRankFree;
+    const uint32_t rank = std::max(step.mesh.point[u].rank(), step.mesh.point[v].rank());
+    if (rank == kRankFixed || (!irregular_.empty() && (irregular_[u] || irregular_[v])))
+        return ++refused_.irregular, false;
+    const bool open = rank != kRankFree;
     if (step.ring.size + open > kMaxNeighbours) return ++refused_.valence, false;
     CHECK_EQ(step.wing.size() + (open && step.wing.size() == 1), size_t(2));
     uint32_t highest = 0;
@@ -118,8 +132,9 @@ bool Recorder::take(const CollapseStep& step) {
         if (lost > 0 && lost > precisionAt(step, end)) recordDummy(step, end);
     r.height = 1 + std::max({highest, heightOf(u), heightOf(v)});
     r.normal = {packNormal(normal_[v]), packNormal(normal_[u])};
-    r.child = {last_[v], last_[u]};
-    r.deviation = step.deviation;
+    r.child = {history_[v].last, history_[u].last};
+    error_before_[v] = std::max(error_before_[v], error_before_[u]);
+    r.deviation = step.deviation + error_before_[v];
     normal_[v] = encodeNormal(decodeNormal(normal_[v]) + decodeNormal(normal_[u]));
     push(r);
     return true;

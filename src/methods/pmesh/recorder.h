@@ -40,15 +40,27 @@ struct QuantisedOffsets {
 };
 QuantisedOffsets quantiseOffsets(const std::array<Vec3i, 2>& offset);
 
+/// What a vertex has been through.
+struct VertexHistory {
+    uint32_t last = kNoOperation;  ///< the record of the last collapse into it
+    uint32_t height = 0;           ///< of that
+    float error = 0;               ///< and its deviation
+};
+
 class Recorder : public CollapseSink {
 public:
     struct Refused {
         uint64_t irregular = 0, valence = 0, level = 0;
     };
 
-    /// `mesh`: the one that is simplified; `irregular`: one a vertex, as HalfEdges has it; both
-    /// must outlive this. Positions are multiples of 2^shift.
+    /// `mesh`: the one that is simplified; `irregular`: one a vertex, as HalfEdges has it, or empty
+    /// where such have the rank kRankFixed; both must outlive this. Positions are multiples of
+    /// 2^shift.
     Recorder(const Mesh& mesh, std::span<const uint8_t> irregular, int shift);
+    /// Goes on where others ended: `history` is that of the vertices, one each; records of this one
+    /// are counted from `first_record` on.
+    Recorder(const Mesh& mesh, std::vector<VertexHistory> history, uint32_t first_record,
+             int shift);
 
     bool take(const CollapseStep& step) override;
 
@@ -57,27 +69,39 @@ public:
     uint64_t dummies() const { return dummies_; }
     /// Attempts, not edges: an edge may be tried again.
     const Refused& refused() const { return refused_; }
-    /// The record of the last collapse into v, or kNoOperation.
-    uint32_t lastOf(uint32_t v) const { return last_[v]; }
+    std::vector<CollapseRecord>& records() { return record_; }
+    const VertexHistory& historyOf(uint32_t v) const { return history_[v]; }
     OctNormal normalOf(uint32_t v) const { return normal_[v]; }
 
 private:
     float precisionAt(const CollapseStep& step, uint32_t end) const;
     void recordDummy(const CollapseStep& step, uint32_t end);
     void push(const CollapseRecord& record);
-    uint32_t heightOf(uint32_t v) const {
-        return last_[v] == kNoOperation ? 0 : record_[last_[v]].height;
-    }
+    uint32_t heightOf(uint32_t v) const { return history_[v].height; }
     Vec3i stepsOf(const WorkingMesh& mesh, const Vec3f& p) const;
 
     std::span<const uint8_t> irregular_;
     int shift_;
     std::vector<OctNormal> normal_;
-    std::vector<uint32_t> last_;
+    std::vector<VertexHistory> history_;
+    std::vector<float> error_before_;  // of what a vertex stands for, before this began
+    uint32_t first_record_ = 0;
     std::vector<CollapseRecord> record_;
     uint32_t largest_ = 0;
     uint64_t dummies_ = 0;
     Refused refused_;
+};
+
+/// All that was collapsed, and what remains. Vertices are numbers of any kind, below `vertices`.
+struct Collapses {
+    std::vector<CollapseRecord> record;  ///< children before parents
+    Mesh base;
+    std::vector<uint32_t> base_vertex;  ///< the number of each
+    std::vector<uint32_t> base_last;    ///< the record it came from last, or kNoOperation
+    size_t vertices = 0;
+    uint32_t largest_height = 0;
+    uint64_t dummies = 0;
+    Recorder::Refused refused;
 };
 
 }  // namespace pietra::pmesh
