@@ -30,16 +30,16 @@ double now() {
     return double(t.tv_sec) + double(t.tv_nsec) * 1e-9;
 }
 
-void report(const ProgressiveMesh& mesh, const BuildCounts& counts, double seconds) {
+void report(const NodeForest& mesh, const BuildCounts& counts, double seconds) {
     std::printf(
         "  built in %.2f s: base %zu vertices, %zu triangles; %zu operations, %llu dummies;"
         " %u levels; %llu irregular vertices\n",
         seconds, mesh.base_vertex.size(), mesh.base_triangle.size(), size_t(counts.operations),
         static_cast<unsigned long long>(counts.dummies), counts.levels,
         static_cast<unsigned long long>(counts.irregular_vertices));
-    std::printf("  %zu nodes, %.1f %% full, %u levels of them\n", counts.row.size(),
-                100.0 * double(counts.operations) / double(counts.row.size() * kNodeSlots),
-                counts.row.empty() ? 0 : counts.row.back().level + 1u);
+    std::printf("  %zu nodes, %.1f %% full, %u levels of them\n", mesh.row.size(),
+                100.0 * double(counts.operations) / double(mesh.row.size() * kNodeSlots),
+                mesh.row.empty() ? 0 : mesh.row.back().level + 1u);
     std::printf(
         "  refused by valence %llu, by level %llu; %llu ends inexact, by %u steps at most;"
         " resident %zu MiB\n",
@@ -49,8 +49,7 @@ void report(const ProgressiveMesh& mesh, const BuildCounts& counts, double secon
         peakResidentBytes() >> 20);
 }
 
-void reportPages(const ProgressiveMesh& mesh, const BuildCounts& counts) {
-    const NodeForest forest = toNodes(mesh, counts.row);
+void reportPages(const NodeForest& forest, const BuildCounts& counts) {
     std::vector<std::vector<std::byte>> pages;
     size_t bytes = encodeBase(forest).size();
     const double begin = now();
@@ -142,9 +141,10 @@ void run(const char* path, int jobs) {
     for (const Vec3i& p : whole.mesh.position) box.add(whole.lattice.toInput(p));
     BuildCounts counts;
     const double begin = now();
-    const ProgressiveMesh mesh = buildInCore(std::move(whole.mesh), whole.lattice, budget, &counts);
-    report(mesh, counts, now() - begin);
-    reportPages(mesh, counts);
+    const NodeForest forest = buildInCore(std::move(whole.mesh), whole.lattice, budget, &counts);
+    const ProgressiveMesh mesh = fromNodes(forest);
+    report(forest, counts, now() - begin);
+    reportPages(forest, counts);
     Adaption adaption(mesh);
     for (int i = 0; i < 2; ++i) {
         settle("refine all", adaption, criterionOf(-1.0, mesh.lattice));

@@ -49,10 +49,7 @@ void fuzzBase(std::span<const std::byte> bytes) {
 
 void writeSeeds(const std::string& directory) {
     Budget budget(size_t(1) << 30);
-    BuildCounts counts;
-    const ProgressiveMesh mesh =
-        buildInCore(test::toLattice(test::sphereShape(20), 900), {}, budget, &counts);
-    const NodeForest forest = toNodes(mesh, counts.row);
+    const NodeForest forest = buildInCore(test::toLattice(test::sphereShape(20), 900), {}, budget);
     const auto save = [&](const std::string& name, std::vector<char> head,
                           const std::vector<std::byte>& bytes) {
         std::ofstream out(directory + "/" + name, std::ios::binary);

@@ -181,7 +181,7 @@ TEST(Adaption, OfTheDragonGoesThereAndBack) {
     WholeMesh whole = readWholeMesh(*openSource({path}), path, {}, space, progress);
     const Lattice lattice = whole.lattice;
     const size_t triangles = whole.mesh.triangleCount();
-    built.mesh = buildInCore(std::move(whole.mesh), lattice, budget, &built.counts);
+    built.mesh = fromNodes(buildInCore(std::move(whole.mesh), lattice, budget, &built.counts));
     EXPECT_EQ(validate(built.mesh), "");
     EXPECT_LT(built.counts.levels, 300u);
     Adaption adaption(built.mesh);

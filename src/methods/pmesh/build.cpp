@@ -14,32 +14,47 @@
 namespace pietra::pmesh {
 namespace {
 
-/// Fine to coarse, as the writer wants them.
-void writeLevels(const NodeForest& forest, ModelWriter& writer, Progress& progress) {
-    constexpr size_t kAtOnce = 1024;
-    std::vector<std::vector<std::byte>> page;
-    size_t end = forest.row.size();
-    while (end > 0) {
-        const uint16_t level = forest.row[end - 1].level;
-        size_t begin = end;
-        while (begin > 0 && forest.row[begin - 1].level == level) --begin;
-        writer.beginLevel(level);
-        for (size_t first = begin; first < end; first += kAtOnce) {
-            page.resize(std::min(kAtOnce, end - first));
-            parallelFor(page.size(),
-                        [&](size_t i) { page[i] = encodeNode(forest.node[first + i]); });
-            for (size_t i = 0; i < page.size(); ++i) {
-                const auto n = NodeIndex(first + i);
-                Node node = tableNode(n, forest.row[n], forest.node[n], forest.lattice.shift);
+/// Pages on their way from the order of encoding to that of the file.
+class PageSpill {
+public:
+    explicit PageSpill(TempSpace& space) : pages_(space) {}
+
+    void add(NodeIndex n, const NodeRow& row, const OperationNode& node, int lattice_shift) {
+        const std::vector<std::byte> page = encodeNode(node);
+        if (entry_.size() <= n) entry_.resize(n + 1);
+        entry_[n] = {tableNode(n, row, node, lattice_shift), pages_.append(page), page.size()};
+    }
+
+    /// Fine to coarse.
+    void write(ModelWriter& writer, Progress& progress) const {
+        std::vector<std::byte> page;
+        for (size_t end = entry_.size(); end > 0;) {
+            size_t begin = end;
+            const uint16_t level = entry_[end - 1].node.level;
+            while (begin > 0 && entry_[begin - 1].node.level == level) --begin;
+            writer.beginLevel(level);
+            for (size_t n = begin; n < end; ++n) {
+                Node node = entry_[n].node;
                 for (NodeIndex& child : node.child)
                     if (child != kNoNode) child -= NodeIndex(end);
-                writer.addPage(page[i], {&node, 1});
+                page.resize(entry_[n].bytes);
+                pages_.read(entry_[n].position, page);
+                writer.addPage(page, {&node, 1});
             }
-            progress.tick(page.size());
+            progress.tick(end - begin);
+            end = begin;
         }
-        end = begin;
     }
-}
+
+private:
+    struct Entry {
+        Node node;
+        uint64_t position = 0;
+        size_t bytes = 0;
+    };
+    Spill pages_;
+    std::vector<Entry> entry_;
+};
 
 ModelInfo infoOf(const InputLeaves& input, const BuildSettings& settings,
                  const BuildCounts& counts) {
@@ -60,7 +75,8 @@ ModelInfo infoOf(const InputLeaves& input, const BuildSettings& settings,
     return info;
 }
 
-BuildReport reportOf(TriangleSource& source, const InputLeaves& input, const BuildCounts& counts) {
+BuildReport reportOf(TriangleSource& source, const InputLeaves& input, const BuildCounts& counts,
+                     uint64_t nodes) {
     BuildReport report;
     report.input_triangles = input.inputTriangles();
     report.input_vertices = input.vertices.size();
@@ -71,7 +87,7 @@ BuildReport reportOf(TriangleSource& source, const InputLeaves& input, const Bui
     report.non_manifold_edges = input.leaves.edges.non_manifold;
     report.inconsistent_edges = input.leaves.edges.inconsistent;
     report.levels = counts.levels;
-    report.nodes = counts.row.size();
+    report.nodes = nodes;
     report.notes = source.notes();
     if (source.schema().colours || !source.schema().scalars.empty())
         report.notes.push_back("this method does not carry colours and scalars yet");
@@ -96,20 +112,21 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
 
     BuildCounts counts;
     NodeForest forest;
+    PageSpill pages(space);
     {
-        const Reservation memory = budget.reserve(kEncodeBytes * input.leaves.triangles,
-                                                  "a progressive mesh, encoded in memory,");
-        const Collapses collapses =
-            collapseByDiamonds(input, settings.patch_triangles, settings.jobs, space, progress);
-        progress.beginStage("encode", 0);
-        const ProgressiveMesh mesh = encode(collapses, lattice, counts);
-        // A file has a node, if only an empty one.
-        if (counts.row.empty()) counts.row.emplace_back();
-        forest = toNodes(mesh, counts.row);
+        Collapses collapses(space);
+        collapseByDiamonds(input, settings.patch_triangles, settings.jobs, space, progress,
+                           collapses);
+        progress.beginStage("encode", collapses.store.size());
+        forest = encode(collapses, lattice, space, counts,
+                        [&](NodeIndex n, const NodeRow& row, const OperationNode& node) {
+                            pages.add(n, row, node, lattice.shift);
+                            progress.tick(node.operation.size());
+                        });
     }
-    BuildReport report = reportOf(source, input, counts);
+    BuildReport report = reportOf(source, input, counts, forest.row.size());
     progress.beginStage("write", forest.row.size());
-    writeLevels(forest, writer, progress);
+    pages.write(writer, progress);
     writer.finish(infoOf(input, settings, counts), {}, encodeBase(forest));
     progress.endStage();
     report.output_bytes = std::filesystem::file_size(settings.output);

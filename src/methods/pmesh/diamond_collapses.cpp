@@ -28,7 +28,7 @@ struct VertexState {
     }
 };
 constexpr size_t kStateFloats = sizeof(VertexState) / sizeof(float);
-static_assert(kStateFloats == 5);
+static_assert(sizeof(VertexState) % sizeof(float) == 0);
 
 VertexState stateOf(const Mesh& mesh, size_t v) {
     VertexState state;
@@ -45,6 +45,7 @@ struct DiamondResult {
     std::vector<CellId> ids;
     std::vector<CellMesh> cells;  ///< states as scalars, with local records
     std::vector<float> errors;
+    std::vector<CollapseLink> link;
     std::vector<CollapseRecord> record;
     std::vector<uint64_t> name;  ///< of the vertices that records mean
     uint32_t largest_height = 0;
@@ -125,6 +126,7 @@ void Collapser::run(std::span<const uint32_t> quota, float child_error, DiamondR
     input.sink = &recorder;
     simplifier_.run(input, simplified_);
     takeApart(recorder, quota.size(), result);
+    result.link = std::move(recorder.links());
     result.record = std::move(recorder.records());
     result.name = name_;
     result.largest_height = recorder.largestHeight();
@@ -136,8 +138,8 @@ void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult&
     const Mesh& mesh = simplified_.mesh;
     std::vector<uint32_t> survivor(mesh.vertexCount(), kNoVertex);
     std::vector<uint8_t> gone(name_.size(), 0);
-    for (const CollapseRecord& r : recorder.records())
-        if (r.u != kNoVertex) gone[r.u] = 1;
+    for (const CollapseLink& link : recorder.links())
+        if (link.u != kNoVertex) gone[link.u] = 1;
     for (uint32_t v = 0; v < name_.size(); ++v)
         if (!gone[v] && simplified_.vertex_map[v] != kNone) {
             CHECK_EQ(survivor[simplified_.vertex_map[v]], kNoVertex);
@@ -177,20 +179,20 @@ void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult&
 class LevelCollapser {
 public:
     LevelCollapser(InputLeaves& input, uint32_t patch_triangles, int jobs, TempSpace& space,
-                   Progress& progress)
+                   Progress& progress, Collapses& out)
         : input_(input),
           patch_triangles_(patch_triangles),
           jobs_(jobs),
           space_(space),
           progress_(progress),
+          out_(out),
           workers_([&input] { return Collapser(input.vertices.lattice().shift); }) {}
 
-    Collapses run() {
+    void run() {
         progress_.beginStage("collapse", input_.leaves.triangles * 3);
         for (int level = input_.leaves.tree->deepestLevel(); level >= 0; --level) runLevel(level);
         runRoot();
         out_.vertices = ids_;
-        return std::move(out_);
     }
 
 private:
@@ -202,7 +204,7 @@ private:
         worker.add(worker.scratch.mesh, cell.blob.store == &input_.store, label);
     }
     void take(DiamondResult& result);
-    uint32_t idOf(uint64_t name) {
+    uint32_t numberOf(uint64_t name) {
         const auto [id, is_new] = id_of_.insert(name, ids_);
         ids_ += is_new;
         return id;
@@ -216,12 +218,12 @@ private:
     int jobs_;
     TempSpace& space_;
     Progress& progress_;
+    Collapses& out_;
     PerThread<Collapser> workers_;
     std::unordered_map<CellId, Cell> below_, cells_;
     std::unique_ptr<CellStore> store_below_, store_;
     KeyMap id_of_;
     uint32_t ids_ = 0;
-    Collapses out_;
 };
 
 void LevelCollapser::runLevel(int level) {
@@ -270,18 +272,23 @@ DiamondResult LevelCollapser::runDiamond(const LevelItem& item, int level) {
 
 /// Gives records and vertices their numbers.
 void LevelCollapser::take(DiamondResult& result) {
-    const auto first = uint32_t(out_.record.size());
+    const uint32_t first = out_.store.size();
     CHECK_LT(first + result.record.size(), size_t(kLocal));
     std::vector<uint32_t> id(result.name.size(), kNoVertex);
-    const auto idOfLocal = [&](uint32_t v) {
-        if (v == kNoVertex) return v;
-        if (id[v] == kNoVertex) id[v] = idOf(result.name[v]);
-        return id[v];
-    };
-    for (CollapseRecord r : result.record) {
-        for (uint32_t* v : {&r.v, &r.u, &r.left, &r.right}) *v = idOfLocal(*v);
-        for (uint32_t& child : r.child) child = globalRecord(child, first);
-        out_.record.push_back(r);
+    for (CollapseLink& link : result.link) {
+        if (link.u == kNoVertex) continue;
+        id[link.u] = numberOf(result.name[link.u]);
+        link.u = id[link.u];
+    }
+    for (size_t i = 0; i < result.record.size(); ++i) {
+        CollapseRecord& r = result.record[i];
+        for (uint8_t k = 0; k < r.ring_size; ++k) {
+            uint32_t& v = r.ring[k];
+            if (id[v] == kNoVertex) id[v] = numberOf(result.name[v]);
+            v = id[v];
+        }
+        for (uint32_t& child : result.link[i].child) child = globalRecord(child, first);
+        out_.store.append(result.link[i], r);
     }
     for (size_t c = 0; c < result.ids.size(); ++c) {
         Mesh& mesh = result.cells[c].mesh;
@@ -320,7 +327,7 @@ void LevelCollapser::runRoot() {
     out_.base = std::move(result.cells[0].mesh);
     for (size_t v = 0; v < out_.base.vertexCount(); ++v) {
         const VertexState state = stateOf(out_.base, v);
-        out_.base_vertex.push_back(idOf(state.name()));
+        out_.base_vertex.push_back(numberOf(state.name()));
         out_.base_last.push_back(state.history.last);
     }
     out_.base.scalar.clear();
@@ -328,9 +335,9 @@ void LevelCollapser::runRoot() {
 
 }  // namespace
 
-Collapses collapseByDiamonds(InputLeaves& input, uint32_t patch_triangles, int jobs,
-                             TempSpace& space, Progress& progress) {
-    return LevelCollapser(input, patch_triangles, jobs, space, progress).run();
+void collapseByDiamonds(InputLeaves& input, uint32_t patch_triangles, int jobs, TempSpace& space,
+                        Progress& progress, Collapses& out) {
+    LevelCollapser(input, patch_triangles, jobs, space, progress, out).run();
 }
 
 }  // namespace pietra::pmesh

@@ -15,8 +15,9 @@
 
 namespace pietra::pmesh {
 
-/// Consumes the leaves. Takes about 60 bytes a triangle beside the diamonds at work.
-Collapses collapseByDiamonds(InputLeaves& input, uint32_t patch_triangles, int jobs,
-                             TempSpace& space, Progress& progress);
+/// Consumes the leaves; `out` is empty. Memory beside the diamonds at work: that of a table of
+/// names, about 50 bytes a vertex.
+void collapseByDiamonds(InputLeaves& input, uint32_t patch_triangles, int jobs, TempSpace& space,
+                        Progress& progress, Collapses& out);
 
 }  // namespace pietra::pmesh

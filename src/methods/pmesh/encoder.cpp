@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "base/check.h"
-#include "methods/pmesh/active_mesh.h"
 #include "methods/pmesh/node_packer.h"
 
 namespace pietra::pmesh {
@@ -23,181 +21,175 @@ uint8_t errorCode(double error) {
     return uint8_t(std::min(encodeRoundedUp<3>(units), kMaxErrorCode));
 }
 
+/// What the operations that a node refers to in a child know from above...
+struct FromAbove {
+    Vec3i centre;
+    ChildCode before;  ///< if it is a dummy
+};
+/// ...and tell.
+struct FromBelow {
+    uint16_t level, radius;
+    uint8_t error;
+};
+
 class Encoder {
 public:
-    Encoder(const Collapses& collapses, const Lattice& lattice, ProgressiveMesh& mesh,
-            BuildCounts& counts)
+    Encoder(const Collapses& collapses, const Packing& packing, BuildCounts& counts,
+            const NodeSink& sink, NodeForest& forest)
         : collapses_(collapses),
-          shift_(lattice.shift),
-          slot_of_(collapses.vertices, kNoVertex),
-          mesh_(mesh),
-          counts_(counts) {
-        mesh_.lattice = lattice;
-    }
+          packing_(packing),
+          counts_(counts),
+          sink_(sink),
+          forest_(forest),
+          step_(double(1 << forest.lattice.shift)) {}
 
-    std::vector<NodeRow> run() {
+    void run() {
         makeBase();
-        orderOperations();
-        Packing packing = pack();
-        listOperations(packing.id_of);
-        encodeStars();
-        saturate();
-        return std::move(packing.row);
+        std::vector<std::vector<FromAbove>> roots(forest_.row.size());
+        for (size_t v = 0; v < forest_.base_vertex.size(); ++v)
+            if (const OperationId o = forest_.base_operation[v]; o != kNoOperation)
+                roots[nodeOf(o)].push_back({forest_.base_vertex[v].position(), kNoChildCode});
+        for (NodeIndex n = 0; n < forest_.row.size(); ++n)
+            if (forest_.row[n].parent == kNoNode) encodeNode(n, roots[n]);
     }
 
 private:
+    struct Work {
+        OperationNode node;
+        std::vector<PackedSlot> slot;
+        std::vector<Operation> operation;
+        std::vector<FromAbove> above;  // of each slot
+        std::array<std::vector<FromAbove>, 2> children;
+        std::array<std::vector<FromBelow>, 2> below;
+    };
+
     void makeBase();
-    void orderOperations();
-    Packing pack();
-    void listOperations(std::span<const OperationId> id_of);
-    void encodeStars();
-    void encode(ActiveMesh& active, OperationId id, const CollapseRecord& r);
-    void encodeDummy(ActiveMesh& active, OperationId id, const CollapseRecord& r);
-    void setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& from);
-    void saturate();
+    std::vector<FromBelow> encodeNode(NodeIndex n, std::span<const FromAbove> frontier);
+    void refine(Work& work) const;
+    Operation encodeOperation(const CollapseRecord& r, const Vec3i& from) const;
+    void setRanks(Operation& o, const CollapseRecord& r) const;
+    void setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& from, uint32_t kinds) const;
+    static void saturate(Work& work);
+    void bound(NodeIndex n, const Work& work);
 
     const Collapses& collapses_;
-    int shift_;
-    std::vector<uint32_t> order_;     // operations' records
-    std::vector<uint32_t> place_of_;  // the inverse
-    std::vector<OperationId> id_;     // one an operation, in that order
-    std::vector<uint32_t> slot_of_;   // input vertices in the active mesh
-    ProgressiveMesh& mesh_;
+    const Packing& packing_;
     BuildCounts& counts_;
+    const NodeSink& sink_;
+    NodeForest& forest_;
+    double step_;
 };
 
 void Encoder::makeBase() {
     const Mesh& base = collapses_.base;
-    mesh_.base_triangle = base.triangle;
-    for (uint32_t slot = 0; slot < base.vertexCount(); ++slot) {
-        const Vec3i p = base.position[slot] >> shift_;
-        mesh_.base_vertex.push_back({p.x, p.y, p.z, packNormal(base.normal[slot])});
-        slot_of_[collapses_.base_vertex[slot]] = slot;
+    forest_.base_triangle = base.triangle;
+    forest_.base_operation = packing_.base_operation;
+    forest_.row = packing_.row;
+    counts_.name_of.assign(collapses_.vertices, kNoVertex);
+    for (uint32_t v = 0; v < base.vertexCount(); ++v) {
+        const Vec3i p = base.position[v] >> forest_.lattice.shift;
+        forest_.base_vertex.push_back({p.x, p.y, p.z, packNormal(base.normal[v])});
+        counts_.name_of[collapses_.base_vertex[v]] = v;
     }
+    for (size_t v = 0; v < packing_.maker.size(); ++v)
+        if (packing_.maker[v] != kNoOperation)
+            counts_.name_of[v] = uint32_t(base.vertexCount()) + packing_.maker[v];
 }
 
-/// Coarse to fine; within a level the last to collapse first.
-void Encoder::orderOperations() {
-    const std::vector<CollapseRecord>& records = collapses_.record;
-    order_.resize(records.size());
-    std::iota(order_.rbegin(), order_.rend(), 0u);
-    std::stable_sort(order_.begin(), order_.end(),
-                     [&](uint32_t a, uint32_t b) { return records[a].height > records[b].height; });
+std::vector<FromBelow> Encoder::encodeNode(NodeIndex n, std::span<const FromAbove> frontier) {
+    Work work;
+    work.slot = packing_.slots(n);
+    work.above.assign(frontier.begin(), frontier.end());
+    work.node.frontier = uint32_t(frontier.size());
+    refine(work);
+    for (const size_t side : {0u, 1u}) {
+        const NodeIndex child = forest_.row[n].child[side];
+        if (child != kNoNode) work.below[side] = encodeNode(child, work.children[side]);
+        for (const FromBelow& b : work.below[side])
+            work.node.reference_level[side].push_back(b.level);
+    }
+    saturate(work);
+    bound(n, work);
+    std::vector<FromBelow> told;
+    for (uint32_t s = 0; s < work.node.frontier; ++s) {
+        const NodeOperation& o = work.node.operation[s];
+        told.push_back({uint16_t(o.structure.level()), o.radius, o.error});
+    }
+    sink_(n, forest_.row[n], work.node);
+    return told;
 }
 
-Packing Encoder::pack() {
-    const std::vector<CollapseRecord>& records = collapses_.record;
-    place_of_.resize(records.size());
-    for (uint32_t i = 0; i < order_.size(); ++i) place_of_[order_[i]] = i;
-    const auto placeOf = [&](uint32_t r) { return r == kNoOperation ? r : place_of_[r]; };
-    std::vector<PackOperation> operations(records.size());
-    for (uint32_t i = 0; i < order_.size(); ++i) {
-        const CollapseRecord& r = records[order_[i]];
-        operations[i] = {{placeOf(r.child[0]), placeOf(r.child[1])}, r.deviation, {}};
-        operations[i].box.add(r.position[0]);
-        if (r.u != kNoVertex) operations[i].box.add(r.position[1]);
-    }
-    std::vector<uint32_t> roots;
-    for (const uint32_t last : collapses_.base_last)
-        if (last != kNoOperation) roots.push_back(placeOf(last));
-    return packOperations(operations, roots);
-}
-
-/// What is known of them without their stars.
-void Encoder::listOperations(std::span<const OperationId> id_of) {
-    const std::vector<CollapseRecord>& records = collapses_.record;
-    id_.assign(id_of.begin(), id_of.end());
-    const auto idOf = [&](uint32_t r) { return r == kNoOperation ? r : id_of[place_of_[r]]; };
-    const OperationId last = id_.empty() ? 0 : *std::max_element(id_.begin(), id_.end()) + 1;
-    Operation none{};
-    none.child = {kNoOperation, kNoOperation};
-    mesh_.operation.assign(last, none);
-    for (uint32_t i = 0; i < order_.size(); ++i) {
-        const CollapseRecord& r = records[order_[i]];
-        Operation& o = mesh_.operation[id_[i]];
-        o.child = {idOf(r.child[0]), idOf(r.child[1])};
-        o.level = uint16_t(collapses_.largest_height - r.height);
-        o.normal = r.normal;
-        o.ranks = r.u == kNoVertex ? Operation::kDummyRanks : uint8_t(0);
-    }
-    for (const OperationId id : id_)
+/// From slot to slot, as the decoder will.
+void Encoder::refine(Work& work) const {
+    std::array<uint32_t, 3> next{work.node.frontier, 0, 0};
+    for (uint32_t s = 0; s < work.slot.size(); ++s) {
+        const CollapseRecord r = collapses_.store.record(work.slot[s].record);
+        const FromAbove above = work.above[s];
+        Operation o = encodeOperation(r, above.centre);
+        if (!o.isDummy()) setOffsets(o, r, above.centre, work.slot[s].kinds);
+        std::array<ChildCode, 2> code{kNoChildCode, o.isDummy() ? above.before : kNoChildCode};
         for (const int end : {0, 1}) {
-            const OperationId child = mesh_.operation[id].childOf(end);
-            if (child != kNoOperation && mesh_.operation[child].isDummy())
-                mesh_.operation[child].child[1] = id;
+            const uint32_t kind = work.slot[s].kinds >> (2 * end) & 3;
+            if (kind == 0) continue;
+            code[size_t(end)] = (kind - 1) * kNodeSlots + next[kind - 1]++;
+            const Vec3i centre = above.centre + o.offset(end);
+            if (kind == 1)
+                work.above.push_back({centre, s});
+            else
+                work.children[kind - 2].push_back({centre, kNodeSlots + s});
         }
-    for (const uint32_t last : collapses_.base_last) mesh_.base_operation.push_back(idOf(last));
-}
-
-void Encoder::encodeStars() {
-    ActiveMesh active(mesh_);
-    const size_t count = order_.size();
-    active.resize(active.vertexCount() + count, active.faceCount() + 2 * count);
-    active.resize(mesh_.base_vertex.size(), mesh_.base_triangle.size());
-    for (size_t i = 0; i < count; ++i) {
-        const OperationId id = id_[i];
-        const CollapseRecord& r = collapses_.record[order_[i]];
-        CHECK_EQ(active.record[slot_of_[r.v]].next, id);
-        if (r.u == kNoVertex) {
-            encodeDummy(active, id, r);
-        } else {
-            encode(active, id, r);
-        }
+        work.operation.push_back(o);
+        NodeOperation packed;
+        packed.structure = StructureWord::of(code[0], code[1], o.level);
+        packed.ranks = o.ranks;
+        packed.delta = o.delta;
+        packed.normal = o.normal;
+        packed.shift = o.shift;
+        work.node.operation.push_back(packed);
     }
-    counts_.name_of = slot_of_;
-    for (uint32_t& name : counts_.name_of)
-        if (name != kNoVertex) name = active.record[name].name;
 }
 
-/// Moves v to where it is to be, as far as sixteen bits reach.
-void Encoder::encodeDummy(ActiveMesh& active, OperationId id, const CollapseRecord& r) {
-    Operation& o = mesh_.operation[id];
-    const uint32_t v = slot_of_[r.v];
-    const Vec3i offset = glm::clamp(r.position[0] - active.vertex[v].position(), -32768, 32767);
-    o.shift = 0;
+Operation Encoder::encodeOperation(const CollapseRecord& r, const Vec3i& from) const {
+    Operation o{};
+    o.level = uint16_t(collapses_.largest_height - r.height);
+    o.normal = r.normal;
+    o.radius = uint16_t(encodeRoundedUp<11>(r.radius));
+    o.error = errorCode(double(r.error) / step_);
+    if (r.ring_size > 0) {
+        setRanks(o, r);
+        return o;
+    }
+    // A dummy: to where the vertex is to be, as far as sixteen bits reach.
+    o.ranks = Operation::kDummyRanks;
+    const Vec3i offset = glm::clamp(r.position[0] - from, -32768, 32767);
     for (int k = 0; k < 3; ++k) {
         o.delta[0][size_t(k)] = int8_t(offset[k] >> 8);
         o.delta[1][size_t(k)] = int8_t(offset[k] & 0xff);
     }
     o.radius = uint16_t(encodeRoundedUp<11>(lengthOf(offset)));
-    o.error = errorCode(lengthOf(offset));
-    active.move(v);
+    o.error = std::max(o.error, errorCode(lengthOf(offset)));
+    return o;
 }
 
-void Encoder::encode(ActiveMesh& active, OperationId id, const CollapseRecord& r) {
-    Operation& o = mesh_.operation[id];
-    const uint32_t v = slot_of_[r.v], u = uint32_t(active.vertexCount());
-    Star star;
-    active.gatherStars(std::span(&v, 1), &star, [](uint32_t) {});
-    CHECK(active.orient(star));
-    uint32_t left = kNoRank, right = kNoRank, radius = 0;
-    const Vec3i from = active.vertex[v].position();
-    for (uint32_t rank = 0; rank < star.neighbours(); ++rank) {
-        const uint32_t w = active.neighbour(star, rank);
-        if (r.left != kNoVertex && w == slot_of_[r.left]) left = rank;
-        if (r.right != kNoVertex && w == slot_of_[r.right]) right = rank;
-        radius = std::max(radius, lengthOf(active.vertex[w].position() - from));
-    }
-    CHECK_EQ(left == kNoRank, r.left == kNoVertex);
-    CHECK_EQ(right == kNoRank, r.right == kNoVertex);
-    o.ranks = uint8_t(left | right << 4);
-    setOffsets(o, r, from);
-    radius = std::max({radius, lengthOf(o.offset(0)), lengthOf(o.offset(1))});
-    o.radius = uint16_t(encodeRoundedUp<11>(radius));
-    o.error = errorCode(double(r.deviation) / double(1 << shift_));
-    const uint32_t face = uint32_t(active.faceCount());
-    active.resize(u + 1, face + (left != kNoRank) + (right != kNoRank));
-    active.split(v, star, u, face);
-    slot_of_[r.u] = u;
+void Encoder::setRanks(Operation& o, const CollapseRecord& r) const {
+    const auto name = [&](uint32_t i) { return counts_.name_of[r.ring[i]]; };
+    uint32_t least = 0;
+    for (uint32_t i = 1; r.closed && i < r.ring_size; ++i)
+        if (name(i) < name(least)) least = i;
+    const auto rank = [&](uint32_t place) {
+        return place == kNoRank ? kNoRank : (place + r.ring_size - least) % r.ring_size;
+    };
+    o.ranks = uint8_t(rank(r.left) | rank(r.right) << 4);
 }
 
-void Encoder::setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& from) {
+void Encoder::setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& from,
+                         uint32_t kinds) const {
     const std::array<Vec3i, 2> offset{r.position[0] - from, r.position[1] - from};
     const QuantisedOffsets q = quantiseOffsets(offset);
     o.shift = q.shift;
     o.delta = q.delta;
     for (const int end : {0, 1}) {
-        if (r.child[size_t(end)] != kNoOperation) continue;  // which puts it right
+        if ((kinds >> (2 * end) & 3) != 0) continue;  // an operation below puts it right
         const Vec3i rest = glm::abs(o.offset(end) - offset[size_t(end)]);
         const uint32_t largest = uint32_t(std::max({rest.x, rest.y, rest.z}));
         counts_.inexact_ends += largest != 0;
@@ -205,34 +197,67 @@ void Encoder::setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& fro
     }
 }
 
-/// From the fine side up: no operation states less than those below it.
-void Encoder::saturate() {
-    for (size_t i = mesh_.operation.size(); i-- > 0;) {
-        Operation& o = mesh_.operation[i];
-        if (o.error == 0) continue;
+/// From the last slot up: no operation states less than those below it.
+void Encoder::saturate(Work& work) {
+    for (size_t s = work.slot.size(); s-- > 0;) {
+        Operation& o = work.operation[s];
         uint32_t radius = decodeRadius(o.radius);
         for (const int end : {0, 1}) {
-            if (o.childOf(end) == kNoOperation) continue;
-            const Operation& child = mesh_.operation[o.childOf(end)];
-            o.error = std::max(o.error, child.error);
-            radius = std::max(radius, lengthOf(o.offset(end)) + decodeRadius(child.radius));
+            const uint32_t kind = work.slot[s].kinds >> (2 * end) & 3;
+            const uint32_t slot = work.node.operation[s].structure.child(end) % kNodeSlots;
+            if (!o.isDummy() || kind != 0) radius = std::max(radius, lengthOf(o.offset(end)));
+            if (kind == 0) continue;
+            const auto enclose = [&](uint16_t below, uint8_t error) {
+                o.error = std::max(o.error, error);
+                radius = std::max(radius, lengthOf(o.offset(end)) + decodeRadius(below));
+            };
+            if (kind == 1)
+                enclose(work.operation[slot].radius, work.operation[slot].error);
+            else
+                enclose(work.below[kind - 2][slot].radius, work.below[kind - 2][slot].error);
         }
         const uint32_t code = encodeRoundedUp<11>(radius);
         CHECK_LE(code, kMaxRadiusCode);
-        o.radius = uint16_t(code);
+        work.node.operation[s].radius = o.radius = uint16_t(code);
+        work.node.operation[s].error = o.error;
     }
+}
+
+/// The sphere around those of the operations referred to from above, which enclose all below, and
+/// around the children's, whose rounding may stick out.
+void Encoder::bound(NodeIndex n, const Work& work) {
+    NodeRow& row = forest_.row[n];
+    Box3i box;
+    for (uint32_t s = 0; s < work.node.frontier; ++s) box.add(work.above[s].centre);
+    if (box.empty()) return;
+    row.centre = (box.min + box.max) >> 1;
+    uint32_t radius = 0;
+    const auto enclose = [&](const Vec3i& centre, uint16_t code, uint8_t error) {
+        radius = std::max(radius, lengthOf(centre - row.centre) + decodeRadius(code));
+        row.error = std::max(row.error, error);
+    };
+    for (uint32_t s = 0; s < work.node.frontier; ++s)
+        enclose(work.above[s].centre, work.operation[s].radius, work.operation[s].error);
+    for (const NodeIndex c : row.child)
+        if (c != kNoNode)
+            enclose(forest_.row[c].centre, forest_.row[c].radius, forest_.row[c].error);
+    row.radius = uint16_t(encodeRoundedUp<11>(radius));
 }
 
 }  // namespace
 
-ProgressiveMesh encode(const Collapses& collapses, const Lattice& lattice, BuildCounts& counts) {
-    ProgressiveMesh mesh;
+NodeForest encode(const Collapses& collapses, const Lattice& lattice, TempSpace& space,
+                  BuildCounts& counts, const NodeSink& sink) {
     counts.refused = collapses.refused;
     counts.levels = collapses.largest_height;
     counts.dummies = collapses.dummies;
-    counts.operations = collapses.record.size();
-    counts.row = Encoder(collapses, lattice, mesh, counts).run();
-    return mesh;
+    counts.operations = collapses.store.size();
+    Packing packing(space);
+    packCollapses(collapses, packing);
+    NodeForest forest;
+    forest.lattice = lattice;
+    Encoder(collapses, packing, counts, sink, forest).run();
+    return forest;
 }
 
 }  // namespace pietra::pmesh

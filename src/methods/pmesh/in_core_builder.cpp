@@ -35,32 +35,31 @@ SimplifyOutput collapseAll(const Mesh& mesh, int shift, Recorder& recorder) {
     return output;
 }
 
-Collapses collapsesOf(Recorder& recorder, const SimplifyOutput& simplified, size_t vertices) {
-    Collapses out;
-    out.vertices = vertices;
+void takeCollapses(Recorder& recorder, const SimplifyOutput& simplified, Collapses& out) {
+    out.vertices = simplified.vertex_map.size();
     out.largest_height = recorder.largestHeight();
     out.dummies = recorder.dummies();
     out.refused = recorder.refused();
-    out.record = std::move(recorder.records());
+    std::vector<uint8_t> gone(out.vertices, 0);
+    for (size_t i = 0; i < recorder.records().size(); ++i) {
+        const CollapseLink& link = recorder.links()[i];
+        if (link.u != kNoVertex) gone[link.u] = 1;
+        out.store.append(link, recorder.records()[i]);
+    }
     out.base = simplified.mesh;
     out.base_vertex.assign(out.base.vertexCount(), kNoVertex);
-    std::vector<uint8_t> gone(vertices, 0);
-    for (const CollapseRecord& r : out.record)
-        if (r.u != kNoVertex) gone[r.u] = 1;
-    for (uint32_t v = 0; v < vertices; ++v)
+    for (uint32_t v = 0; v < out.vertices; ++v)
         if (!gone[v] && simplified.vertex_map[v] != kNone)
             out.base_vertex[simplified.vertex_map[v]] = v;
     for (uint32_t slot = 0; slot < out.base.vertexCount(); ++slot) {
         out.base.normal[slot] = recorder.normalOf(out.base_vertex[slot]);
         out.base_last.push_back(recorder.historyOf(out.base_vertex[slot]).last);
     }
-    return out;
 }
 
 }  // namespace
 
-ProgressiveMesh buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
-                            BuildCounts* counts) {
+NodeForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget, BuildCounts* counts) {
     const Reservation memory =
         budget.reserve(kBuildBytes * mesh.triangleCount(), "a progressive mesh, built in memory,");
     BuildCounts unused;
@@ -74,7 +73,17 @@ ProgressiveMesh buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
     c.irregular_vertices = uint64_t(std::count(irregular.begin(), irregular.end(), 1));
     Recorder recorder(mesh, irregular, lattice.shift);
     const SimplifyOutput base = collapseAll(mesh, lattice.shift, recorder);
-    return encode(collapsesOf(recorder, base, mesh.vertexCount()), lattice, c);
+    TempSpace space{"", &budget, 0};
+    Collapses collapses(space);
+    takeCollapses(recorder, base, collapses);
+    std::vector<OperationNode> nodes;
+    NodeForest forest =
+        encode(collapses, lattice, space, c, [&](NodeIndex n, const NodeRow&, OperationNode& node) {
+            nodes.resize(std::max<size_t>(nodes.size(), n + 1));
+            nodes[n] = std::move(node);
+        });
+    forest.node = std::move(nodes);
+    return forest;
 }
 
 }  // namespace pietra::pmesh

@@ -14,7 +14,7 @@ inline constexpr size_t kBuildBytes = 240;
 
 /// `mesh`: welded, without degenerate or doubled triangles, with normals, all positions multiples
 /// of 2^lattice.shift; its edge classes are set here.
-ProgressiveMesh buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
-                            BuildCounts* counts = nullptr);
+NodeForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
+                       BuildCounts* counts = nullptr);
 
 }  // namespace pietra::pmesh

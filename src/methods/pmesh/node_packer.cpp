@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <numeric>
 #include <queue>
+#include <unordered_map>
 
 #include "base/check.h"
 
 namespace pietra::pmesh {
 namespace {
-
-/// Of an operation without a place: the node that is being filled will take it.
-constexpr OperationId kChosen = kNoOperation - 1;
 
 /// An operation with all that is below it.
 struct Subtree {
@@ -102,28 +100,24 @@ const std::vector<uint8_t>& Cutter::cutWithin(std::span<const Subtree> trees, si
 
 class Packer {
 public:
-    Packer(std::span<PackOperation> operations, Packing& packing)
-        : operation_(operations), packing_(packing) {
-        packing_.id_of.assign(operations.size(), kNoOperation);
-        count_.assign(operations.size(), 1);
-        for (size_t i = operations.size(); i-- > 0;)
-            for (const uint32_t c : operations[i].child) {
-                if (c == kNoOperation) continue;
-                CHECK_LT(i, size_t(c));
-                count_[i] += count_[c];
-                operations[i].box.add(operations[c].box);
-                operations[i].error = std::max(operations[i].error, operations[c].error);
-            }
+    Packer(const Collapses& collapses, Packing& packing)
+        : collapses_(collapses), packing_(packing) {
+        packing_.maker.assign(collapses.vertices, kNoOperation);
     }
 
-    void run(std::span<const uint32_t> roots) {
+    void run() {
         std::vector<Subtree> all;
-        for (const uint32_t o : roots) all.push_back(subtree(o));
-        if (!all.empty()) addRoots(std::move(all));
+        for (const uint32_t record : collapses_.base_last)
+            if (record != kNoOperation) all.push_back(subtree(record, link(record)));
+        addRoots(std::move(all));  // of an empty model one node, without operations
         while (!waiting_.empty()) {
             const Waiting next = std::move(waiting_.front());
             waiting_.pop();
             fill(next);
+        }
+        for (const uint32_t record : collapses_.base_last) {
+            const auto found = root_.find(record);
+            packing_.base_operation.push_back(found == root_.end() ? kNoOperation : found->second);
         }
     }
 
@@ -132,26 +126,44 @@ private:
         NodeIndex node;
         std::vector<uint32_t> frontier;
     };
+    /// A record that the node being filled takes or refers to.
+    struct Known {
+        CollapseLink link;
+        bool is_taken = false;
+    };
 
-    Subtree subtree(uint32_t o) const { return {o, count_[o], operation_[o].box}; }
+    CollapseLink link(uint32_t record) const { return collapses_.store.link(record); }
+    static Subtree subtree(uint32_t record, const CollapseLink& link) {
+        return {record, link.operations, link.box};
+    }
     void addRoots(std::vector<Subtree> trees);
     NodeIndex addNode(NodeIndex parent, std::span<const Subtree> frontier);
     void fill(const Waiting& waiting);
     void choose(const Waiting& waiting);
-    void addChildren(NodeIndex node);
+    /// One a reference.
+    std::vector<uint8_t> sidesOf() {
+        uint64_t operations = 0;
+        for (const Subtree& tree : reference_) operations += tree.count;
+        if (operations <= kNodeSlots || reference_.size() == 1)
+            return std::vector<uint8_t>(reference_.size(), 0);
+        return cutter_.cut(reference_);
+    }
 
-    std::span<PackOperation> operation_;
+    const Collapses& collapses_;
     Packing& packing_;
-    std::vector<uint32_t> count_;
     std::queue<Waiting> waiting_;
+    std::unordered_map<uint32_t, OperationId> root_;
     Cutter cutter_;
-    std::vector<uint32_t> slots_;     // of the node being filled
+    // Of the node being filled:
+    std::unordered_map<uint32_t, Known> known_;
     std::vector<Subtree> reference_;  // beyond it
 };
 
 void Packer::addRoots(std::vector<Subtree> trees) {
     if (trees.size() <= kNodeSlots) {
-        addNode(kNoNode, trees);
+        const NodeIndex node = addNode(kNoNode, trees);
+        for (uint32_t s = 0; s < trees.size(); ++s)
+            root_[trees[s].operation] = operationId(node, s);
         return;
     }
     const std::vector<uint8_t> side = cutter_.cutFreely(trees);
@@ -168,6 +180,7 @@ NodeIndex Packer::addNode(NodeIndex parent, std::span<const Subtree> frontier) {
     NodeRow& row = packing_.row.emplace_back();
     row.parent = parent;
     row.level = parent == kNoNode ? uint16_t(0) : uint16_t(packing_.row[parent].level + 1);
+    packing_.frontier.push_back(uint32_t(frontier.size()));
     Waiting waiting{node, {}};
     for (const Subtree& tree : frontier) waiting.frontier.push_back(tree.operation);
     waiting_.push(std::move(waiting));
@@ -177,70 +190,82 @@ NodeIndex Packer::addNode(NodeIndex parent, std::span<const Subtree> frontier) {
 /// Numbers the slots: those referred to from above, then each as it is referred to.
 void Packer::fill(const Waiting& waiting) {
     choose(waiting);
-    const NodeIndex node = waiting.node;
-    slots_ = waiting.frontier;
+    std::vector<PackedSlot> slots;
+    for (const uint32_t record : waiting.frontier) slots.push_back({record, 0});
+    std::vector<std::array<uint32_t, 2>> beyond;  // slot and end of each reference
     reference_.clear();
-    for (size_t slot = 0; slot < slots_.size(); ++slot) {
-        packing_.id_of[slots_[slot]] = operationId(node, uint32_t(slot));
-        for (const uint32_t c : operation_[slots_[slot]].child) {
-            if (c == kNoOperation) continue;
-            if (packing_.id_of[c] == kChosen) {
-                slots_.push_back(c);
+    for (uint32_t s = 0; s < slots.size(); ++s) {
+        const CollapseLink& link = known_.at(slots[s].record).link;
+        if (link.u != kNoVertex) packing_.maker[link.u] = operationId(waiting.node, s);
+        for (const uint32_t end : {0u, 1u}) {
+            const uint32_t child = link.child[end];
+            if (child == kNoOperation) continue;
+            const Known& known = known_.at(child);
+            if (known.is_taken) {
+                slots[s].kinds |= 1u << (2 * end);
+                slots.push_back({child, 0});
             } else {
-                reference_.push_back(subtree(c));
+                reference_.push_back(subtree(child, known.link));
+                beyond.push_back({s, end});
             }
         }
     }
-    packing_.row[node].operations = uint32_t(slots_.size());
-    addChildren(node);
-}
-
-/// Marks what fits into the node beside the frontier.
-void Packer::choose(const Waiting& waiting) {
-    const auto less = [&](uint32_t a, uint32_t b) {
-        return operation_[a].error != operation_[b].error
-                   ? operation_[a].error < operation_[b].error
-                   : a > b;
-    };
-    std::priority_queue<uint32_t, std::vector<uint32_t>, decltype(less)> next(less);
-    const auto open = [&](uint32_t o) {
-        for (const uint32_t c : operation_[o].child)
-            if (c != kNoOperation) next.push(c);
-    };
-    CHECK_LE(waiting.frontier.size(), size_t(kNodeSlots));
-    for (const uint32_t o : waiting.frontier) open(o);
-    for (size_t room = kNodeSlots - waiting.frontier.size(); room > 0 && !next.empty(); --room) {
-        const uint32_t o = next.top();
-        next.pop();
-        packing_.id_of[o] = kChosen;
-        open(o);
-    }
-}
-
-void Packer::addChildren(NodeIndex node) {
-    if (reference_.empty()) return;
-    uint64_t operations = 0;
-    for (const Subtree& tree : reference_) operations += tree.count;
-    if (operations <= kNodeSlots || reference_.size() == 1) {
-        packing_.row[node].child[0] = addNode(node, reference_);
-        return;
-    }
-    const std::vector<uint8_t>& side = cutter_.cut(reference_);
+    const std::vector<uint8_t> side = sidesOf();
+    for (size_t i = 0; i < side.size(); ++i)
+        slots[beyond[i][0]].kinds |= (2u + side[i]) << (2 * beyond[i][1]);
+    packing_.row[waiting.node].operations = uint32_t(slots.size());
+    packing_.append(slots);
     for (const size_t which : {0u, 1u}) {
         std::vector<Subtree> part;
-        for (size_t i = 0; i < reference_.size(); ++i)
+        for (size_t i = 0; i < side.size(); ++i)
             if (side[i] == which) part.push_back(reference_[i]);
-        const NodeIndex child = addNode(node, part);
-        packing_.row[node].child[which] = child;
+        if (part.empty()) continue;
+        const NodeIndex child = addNode(waiting.node, part);
+        packing_.row[waiting.node].child[which] = child;
+    }
+}
+
+/// Takes what fits into the node beside the frontier.
+void Packer::choose(const Waiting& waiting) {
+    known_.clear();
+    std::priority_queue<std::pair<float, uint32_t>> next;
+    const auto take = [&](Known& known) {
+        known.is_taken = true;
+        const CollapseLink taken = known.link;  // known_ may move
+        for (const uint32_t c : taken.child) {
+            if (c == kNoOperation) continue;
+            const CollapseLink child = link(c);
+            known_[c] = {child, false};
+            next.push({child.error, c});
+        }
+    };
+    CHECK_LE(waiting.frontier.size(), size_t(kNodeSlots));
+    for (const uint32_t record : waiting.frontier) {
+        Known& known = known_[record];
+        known.link = link(record);
+        take(known);
+    }
+    for (size_t room = kNodeSlots - waiting.frontier.size(); room > 0 && !next.empty(); --room) {
+        const uint32_t record = next.top().second;
+        next.pop();
+        take(known_.at(record));
     }
 }
 
 }  // namespace
 
-Packing packOperations(std::span<PackOperation> operations, std::span<const uint32_t> roots) {
-    Packing packing;
-    Packer(operations, packing).run(roots);
-    return packing;
+std::vector<PackedSlot> Packing::slots(NodeIndex node) const {
+    std::vector<PackedSlot> slots(row[node].operations);
+    slots_.read(begin_[node], std::as_writable_bytes(std::span(slots)));
+    return slots;
+}
+
+void Packing::append(std::span<const PackedSlot> slots) {
+    begin_.push_back(slots_.append(std::as_bytes(slots)));
+}
+
+void packCollapses(const Collapses& collapses, Packing& packing) {
+    Packer(collapses, packing).run();
 }
 
 }  // namespace pietra::pmesh

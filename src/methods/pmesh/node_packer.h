@@ -10,28 +10,42 @@
 // The paper's estimate is multiplied by the number of nodes that the sides need at least, so that
 // cuts that leave less empty win: nodes are 96 to 99 % full.
 //
-// The result is a function of the arguments. n log kNodeSlots; 16 bytes an operation.
+// The result is a function of the collapses. n log kNodeSlots. Memory: four bytes a vertex, and
+// some hundreds a node; the slots lie in temporary space.
 
 #include <span>
 #include <vector>
 
 #include "methods/pmesh/operation_node.h"
+#include "methods/pmesh/recorder.h"
 
 namespace pietra::pmesh {
 
-struct PackOperation {
-    std::array<uint32_t, 2> child;  ///< indices, or kNoOperation
-    float error;                    ///< need not be saturated
-    Box3i box;                      ///< of what the operation itself touches
+struct PackedSlot {
+    uint32_t record;
+    uint32_t kinds;  ///< of both children, two bits each: none, in this node, in its child 0, in 1
 };
 
-struct Packing {
+class Packing {
+public:
+    explicit Packing(TempSpace& space) : slots_(space) {}
+
     std::vector<NodeRow> row;        ///< parent, child, operations and level
-    std::vector<OperationId> id_of;  ///< one an operation
+    std::vector<uint32_t> frontier;  ///< one a node
+    /// One a vertex: the operation that makes it, or kNoOperation.
+    std::vector<OperationId> maker;
+    /// One a base vertex: its first operation, or kNoOperation.
+    std::vector<OperationId> base_operation;
+
+    std::vector<PackedSlot> slots(NodeIndex node) const;
+    void append(std::span<const PackedSlot> slots);
+
+private:
+    Spill slots_;
+    std::vector<uint64_t> begin_;
 };
 
-/// `roots`: those without a parent. Parents lie before their children. Changes errors and boxes to
-/// those of all that is below an operation.
-Packing packOperations(std::span<PackOperation> operations, std::span<const uint32_t> roots);
+/// Sets all of `packing`, which is empty.
+void packCollapses(const Collapses& collapses, Packing& packing);
 
 }  // namespace pietra::pmesh

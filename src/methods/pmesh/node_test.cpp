@@ -28,17 +28,18 @@ void expectNoFault(const NodeForest& forest) {
 
 TEST_P(EachForest, KeepsItsRulesAndItsOperations) {
     const Built built = buildFor(GetParam().make());
-    const NodeForest forest = toNodes(built.mesh, built.counts.row);
+    const NodeForest& forest = built.forest;
     expectNoFault(forest);
     uint64_t operations = 0;
     for (const NodeRow& row : forest.row) operations += row.operations;
     EXPECT_EQ(operations, built.counts.operations);
-    EXPECT_EQ(fromNodes(forest).operation, built.mesh.operation);
+    EXPECT_EQ(validate(built.mesh), "");
+    EXPECT_EQ(validateStars(built.mesh), "");
 }
 
 TEST_P(EachForest, ANodeIsNeededBeforeAnythingInItOrBelow) {
     const Built built = buildFor(GetParam().make());
-    const NodeForest forest = toNodes(built.mesh, built.counts.row);
+    const NodeForest& forest = built.forest;
     std::vector<Vec3i> centre(built.mesh.operation.size());
     for (size_t v = 0; v < built.mesh.base_vertex.size(); ++v)
         if (built.mesh.base_operation[v] != kNoOperation)
@@ -69,7 +70,7 @@ TEST_P(EachForest, ANodeIsNeededBeforeAnythingInItOrBelow) {
 
 TEST_P(EachForest, SurvivesItsCodec) {
     const Built built = buildFor(GetParam().make());
-    const NodeForest forest = toNodes(built.mesh, built.counts.row);
+    const NodeForest& forest = built.forest;
     std::string fault;
     for (NodeIndex n = 0; n < forest.node.size(); ++n) {
         OperationNode node;
@@ -84,46 +85,55 @@ TEST_P(EachForest, SurvivesItsCodec) {
     EXPECT_EQ(base.base_operation, forest.base_operation);
 }
 
-/// A tree of operations along a line, each with two children as long as there are any left.
-std::vector<PackOperation> line(uint32_t count, bool chain) {
-    std::vector<PackOperation> operations(count);
+/// A tree of operations, or a chain, along a line; or all of them trees of their own.
+enum class Shape { kTree, kChain, kLoose };
+void makeCollapses(uint32_t count, Shape shape, Collapses& out) {
+    std::vector<CollapseLink> links(count);
+    // Children lie before their parents.
     for (uint32_t i = 0; i < count; ++i) {
-        const auto child = [&](uint32_t c) { return c < count ? c : kNoOperation; };
-        operations[i].child = chain ? std::array{child(i + 1), kNoOperation}
-                                    : std::array{child(2 * i + 1), child(2 * i + 2)};
-        operations[i].error = float(count - i);
-        operations[i].box.add(Vec3i(int32_t(i * 7919 % count), int32_t(i % 64), 0));
+        CollapseLink& link = links[i];
+        const uint32_t place = count - 1 - i;  // from the root
+        const auto child = [&](uint32_t c) { return c < count ? count - 1 - c : kNoOperation; };
+        link.child = {kNoOperation, kNoOperation};
+        if (shape == Shape::kTree) link.child = {child(2 * place + 1), child(2 * place + 2)};
+        if (shape == Shape::kChain) link.child[0] = child(place + 1);
+        link.u = i;
+        link.error = float(i);
+        link.box.add(Vec3i(int32_t(uint64_t(i) * 7919 % count), int32_t(i % 64), 0));
+        for (const uint32_t c : link.child) {
+            if (c == kNoOperation) continue;
+            link.operations += links[c].operations;
+            link.box.add(links[c].box);
+        }
+        out.store.append(link, {});
+        if (shape == Shape::kLoose || place == 0) out.base_last.push_back(i);
     }
-    return operations;
+    out.vertices = count;
 }
 
 TEST(NodePacker, FillsWhateverTheShape) {
+    Budget budget(size_t(1) << 28);
+    TempSpace space{testing::TempDir(), &budget, 0};
     for (const uint32_t count : {0u, 1u, 681u, 682u, 683u, 1364u, 1365u, 20000u})
-        for (const bool chain : {false, true}) {
-            std::vector<PackOperation> operations = line(count, chain);
-            const std::vector<uint32_t> roots(count > 0, 0u);
-            const Packing packing = packOperations(operations, roots);
-            std::set<OperationId> ids(packing.id_of.begin(), packing.id_of.end());
+        for (const Shape shape : {Shape::kTree, Shape::kChain, Shape::kLoose}) {
+            Collapses collapses(space);
+            makeCollapses(count, shape, collapses);
+            Packing packing(space);
+            packCollapses(collapses, packing);
+            const std::set<OperationId> ids(packing.maker.begin(), packing.maker.end());
             EXPECT_EQ(ids.size(), count);
             uint32_t sum = 0;
-            for (const NodeRow& row : packing.row) {
+            for (NodeIndex n = 0; n < packing.row.size(); ++n) {
+                const NodeRow& row = packing.row[n];
                 EXPECT_LE(row.operations, kNodeSlots);
-                EXPECT_GT(row.operations, 0u);
+                EXPECT_TRUE(row.operations > 0 || count == 0);
+                EXPECT_EQ(packing.slots(n).size(), row.operations);
+                EXPECT_TRUE(shape != Shape::kLoose || row.parent == kNoNode);
                 sum += row.operations;
             }
             EXPECT_EQ(sum, count);
             EXPECT_LE(packing.row.size(), 1 + count / (kNodeSlots * 9 / 10)) << count;
         }
-}
-
-TEST(NodePacker, HasSeveralRootsWhereOneDoesNotSuffice) {
-    std::vector<PackOperation> operations = line(3000, false);
-    for (PackOperation& o : operations) o.child = {kNoOperation, kNoOperation};
-    std::vector<uint32_t> roots(operations.size());
-    for (uint32_t i = 0; i < roots.size(); ++i) roots[i] = i;
-    const Packing packing = packOperations(operations, roots);
-    EXPECT_EQ(packing.row.size(), 5u);
-    for (const NodeRow& row : packing.row) EXPECT_EQ(row.parent, kNoNode);
 }
 
 TEST(StructureWord, KeepsCodesAtTheirBorders) {
@@ -153,7 +163,7 @@ TEST(StructureWord, KeepsCodesAtTheirBorders) {
 
 TEST(DamagedNode, IsRefusedWithAMessage) {
     const Built built = buildFor(onLattice(dented(test::sphereShape(24), 0.01), 900));
-    const NodeForest whole = toNodes(built.mesh, built.counts.row);
+    const NodeForest& whole = built.forest;
     ASSERT_GT(whole.node.size(), 3u);
     const auto expect = [&](const std::string& message, const auto& damage) {
         OperationNode node = whole.node[0];
@@ -198,7 +208,7 @@ TEST(DamagedNode, IsRefusedWithAMessage) {
 /// What is accepted keeps its rules, whatever the bytes.
 TEST(DamagedNode, IsRefusedOrSound) {
     const Built built = buildFor(onLattice(dented(test::sphereShape(24), 0.01), 900));
-    const NodeForest forest = toNodes(built.mesh, built.counts.row);
+    const NodeForest& forest = built.forest;
     std::mt19937 random(21);
     std::string fault;
     uint32_t refused = 0;

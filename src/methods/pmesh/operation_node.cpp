@@ -3,84 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-
-#include "base/check.h"
 
 namespace pietra::pmesh {
-namespace {
-
-/// Integer, rounded up.
-uint32_t distance(const Vec3i& a, const Vec3i& b) {
-    const Vec3d d(a - b);
-    return uint32_t(std::ceil(std::sqrt(glm::dot(d, d))));
-}
-
-ChildCode codeOf(OperationId child, NodeIndex node, const NodeRow& row, bool is_before) {
-    if (child == kNoOperation) return kNoChildCode;
-    const NodeIndex of = nodeOf(child);
-    if (of == node) return slotIn(child);
-    if (of == (is_before ? row.parent : row.child[0])) return kNodeSlots + slotIn(child);
-    CHECK_EQ(of, row.child[1]);
-    return 2 * kNodeSlots + slotIn(child);
-}
-
-NodeOperation toNodeOperation(const Operation& o, NodeIndex node, const NodeRow& row) {
-    NodeOperation n;
-    n.structure = StructureWord::of(codeOf(o.child[0], node, row, false),
-                                    codeOf(o.child[1], node, row, o.isDummy()), o.level);
-    n.radius = o.radius;
-    n.error = o.error;
-    n.ranks = o.ranks;
-    n.delta = o.delta;
-    n.normal = o.normal;
-    n.shift = o.shift;
-    return n;
-}
-
-/// Where the vertex lies that each operation splits.
-std::vector<Vec3i> centresOf(const ProgressiveMesh& mesh) {
-    std::vector<Vec3i> centre(mesh.operation.size());
-    for (size_t v = 0; v < mesh.base_vertex.size(); ++v)
-        if (mesh.base_operation[v] != kNoOperation)
-            centre[mesh.base_operation[v]] = mesh.base_vertex[v].position();
-    for (OperationId id = 0; id < mesh.operation.size(); ++id) {
-        const Operation& o = mesh.operation[id];
-        for (const int end : {0, 1})
-            if (o.error != 0 && o.childOf(end) != kNoOperation)
-                centre[o.childOf(end)] = centre[id] + o.offset(end);
-    }
-    return centre;
-}
-
-/// From the last node up: the sphere around those of the operations referred to from above, which
-/// enclose all below, and around the children's, whose rounding may stick out.
-void boundRows(const ProgressiveMesh& mesh, NodeForest& forest) {
-    const std::vector<Vec3i> centre = centresOf(mesh);
-    for (NodeIndex n = NodeIndex(forest.row.size()); n-- > 0;) {
-        NodeRow& row = forest.row[n];
-        const std::span<const NodeOperation> above(forest.node[n].operation.data(),
-                                                   forest.node[n].frontier);
-        Box3i box;
-        for (uint32_t s = 0; s < above.size(); ++s) box.add(centre[operationId(n, s)]);
-        row.centre = box.empty() ? Vec3i(0) : (box.min + box.max) >> 1;
-        uint32_t radius = 0;
-        row.error = 0;
-        const auto enclose = [&](const Vec3i& c, uint32_t radius_code, uint8_t error) {
-            radius = std::max(radius, distance(c, row.centre) + decodeRadius(radius_code));
-            row.error = std::max(row.error, error);
-        };
-        for (uint32_t s = 0; s < above.size(); ++s)
-            enclose(centre[operationId(n, s)], above[s].radius, above[s].error);
-        for (const NodeIndex c : row.child)
-            if (c != kNoNode)
-                enclose(forest.row[c].centre, forest.row[c].radius, forest.row[c].error);
-        row.radius = uint16_t(encodeRoundedUp<11>(radius));
-    }
-}
-
-}  // namespace
-
 Operation toOperation(NodeIndex node, const NodeRow& row, const NodeOperation& n) {
     Operation o;
     o.child = {childId(node, row, n, 0), childId(node, row, n, 1)};
@@ -136,34 +60,6 @@ std::vector<NodeRow> rowsOf(std::span<const Node> table, int lattice_shift) {
                         : uint8_t(encodeRoundedUp<3>(units > 0 ? uint64_t(units) : 0));
     }
     return rows;
-}
-
-NodeForest toNodes(const ProgressiveMesh& mesh, std::vector<NodeRow> rows) {
-    NodeForest forest{mesh.lattice,        mesh.base_vertex, mesh.base_triangle,
-                      mesh.base_operation, std::move(rows),  {}};
-    forest.node.resize(forest.row.size());
-    for (const OperationId id : mesh.base_operation)
-        if (id != kNoOperation) ++forest.node[nodeOf(id)].frontier;
-    for (NodeIndex n = 0; n < forest.row.size(); ++n) {
-        const NodeRow& row = forest.row[n];
-        OperationNode& node = forest.node[n];
-        for (uint32_t s = 0; s < row.operations; ++s) {
-            const Operation& o = mesh.operation[operationId(n, s)];
-            node.operation.push_back(toNodeOperation(o, n, row));
-            for (const int end : {0, 1}) {
-                const OperationId c = o.childOf(end);
-                if (c == kNoOperation || nodeOf(c) == n) continue;
-                auto& levels = node.reference_level[nodeOf(c) == row.child[0] ? 0 : 1];
-                CHECK_EQ(levels.size(), size_t(slotIn(c)));
-                levels.push_back(mesh.operation[c].level);
-            }
-        }
-        for (const size_t side : {0u, 1u})
-            if (row.child[side] != kNoNode)
-                forest.node[row.child[side]].frontier = uint32_t(node.reference_level[side].size());
-    }
-    boundRows(mesh, forest);
-    return forest;
 }
 
 ProgressiveMesh fromNodes(const NodeForest& forest) {

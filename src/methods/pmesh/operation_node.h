@@ -127,10 +127,7 @@ struct NodeForest {
 Node tableNode(NodeIndex index, const NodeRow& row, const OperationNode& node, int lattice_shift);
 std::vector<NodeRow> rowsOf(std::span<const Node> table, int lattice_shift);
 
-/// Splits a mesh whose ids are those of nodes into these, and back. Of each row, parent, child,
-/// operations and level are given (node_packer.h), the rest is computed.
-NodeForest toNodes(const ProgressiveMesh& mesh, std::vector<NodeRow> row);
-/// All nodes must be there, and without fault.
+/// As one forest, in memory. All nodes must be there, and without fault.
 ProgressiveMesh fromNodes(const NodeForest& forest);
 
 /// Both take nodes of unknown origin and say the first fault in a sentence, empty if there is none;

@@ -81,7 +81,7 @@ TEST_P(EachMesh, TheSameBytesAgain) {
     const Built a = buildFor(input), b = buildFor(input);
     EXPECT_EQ(a.mesh.base_vertex, b.mesh.base_vertex);
     EXPECT_EQ(a.mesh.operation, b.mesh.operation);
-    EXPECT_EQ(a.counts.row, b.counts.row);
+    EXPECT_EQ(a.forest.row, b.forest.row);
 }
 
 TEST(PmeshCodes, RoundUpAndAreMonotone) {

@@ -14,6 +14,8 @@
 #include <span>
 #include <vector>
 
+#include "extmem/spill.h"
+#include "geometry/bounds.h"
 #include "methods/pmesh/operations.h"
 #include "simplify/collapse_sink.h"
 
@@ -21,16 +23,52 @@ namespace pietra::pmesh {
 
 inline constexpr uint32_t kNoVertex = ~0u;
 
-/// A dummy has no u, left and right. Vertices are those of the mesh that is simplified; positions
-/// in steps.
+/// A collapse, as packing into nodes sees it. A dummy has no u.
+struct CollapseLink {
+    std::array<uint32_t, 2> child;  ///< the records that v and u came from, or kNoOperation
+    uint32_t u = kNoVertex;         ///< a vertex
+    uint32_t operations = 1;        ///< it and all below
+    float error = 0;                ///< lattice units, an estimate; no less than those below
+    Box3i box;                      ///< of where it and all below bring vertices, in steps
+};
+
+/// The rest, as encoding sees it. Positions in steps, and as they were before the collapse.
 struct CollapseRecord {
-    uint32_t v, u = kNoVertex;
-    uint32_t left = kNoVertex, right = kNoVertex;
-    std::array<Vec3i, 2> position;   ///< of v and of u, before
-    std::array<uint16_t, 2> normal;  ///< the same
-    std::array<uint32_t, 2> child;   ///< the records that v and u came from, or kNoOperation
-    uint32_t height;                 ///< from 1
-    float deviation;                 ///< lattice units, an estimate: Collapser::deviation()
+    std::array<Vec3i, 2> position;            ///< of v and of u
+    std::array<uint16_t, 2> normal;           ///< the same
+    float error;                              ///< as in the link
+    uint32_t radius = 0;                      ///< from the merged vertex to the farthest touched
+    uint16_t height;                          ///< from 1
+    uint8_t left = kNoRank, right = kNoRank;  ///< of vl and vr, in the ring
+    uint8_t ring_size = 0;                    ///< 0: a dummy
+    bool closed = false;
+    /// The neighbours of the merged vertex, counter-clockwise; where it is open, from the
+    /// beginning.
+    std::array<uint32_t, kMaxNeighbours> ring;
+};
+
+/// Collapses of a whole model, in temporary space.
+class CollapseStore {
+public:
+    explicit CollapseStore(TempSpace& space) : links_(space), records_(space) {}
+    void append(const CollapseLink& link, const CollapseRecord& record) {
+        links_.append(std::as_bytes(std::span(&link, 1)));
+        records_.append(std::as_bytes(std::span(&record, 1)));
+        ++size_;
+    }
+    uint32_t size() const { return size_; }
+    CollapseLink link(uint32_t i) const { return at<CollapseLink>(links_, i); }
+    CollapseRecord record(uint32_t i) const { return at<CollapseRecord>(records_, i); }
+
+private:
+    template <class T>
+    static T at(const Spill& spill, uint32_t i) {
+        T value;
+        spill.read(uint64_t(i) * sizeof(T), std::as_writable_bytes(std::span(&value, 1)));
+        return value;
+    }
+    Spill links_, records_;
+    uint32_t size_ = 0;
 };
 
 /// How the offsets of one operation's ends are stored.
@@ -44,7 +82,9 @@ QuantisedOffsets quantiseOffsets(const std::array<Vec3i, 2>& offset);
 struct VertexHistory {
     uint32_t last = kNoOperation;  ///< the record of the last collapse into it
     uint32_t height = 0;           ///< of that
-    float error = 0;               ///< and its deviation
+    uint32_t operations = 0;       ///< of that and all below
+    float error = 0;               ///< of that
+    Box3i box;                     ///< of that and all below
 };
 
 class Recorder : public CollapseSink {
@@ -64,19 +104,22 @@ public:
 
     bool take(const CollapseStep& step) override;
 
-    const std::vector<CollapseRecord>& records() const { return record_; }
+    /// As many links as records; children before parents.
+    std::vector<CollapseLink>& links() { return link_; }
+    const std::vector<CollapseLink>& links() const { return link_; }
+    std::vector<CollapseRecord>& records() { return record_; }
     uint32_t largestHeight() const { return largest_; }
     uint64_t dummies() const { return dummies_; }
     /// Attempts, not edges: an edge may be tried again.
     const Refused& refused() const { return refused_; }
-    std::vector<CollapseRecord>& records() { return record_; }
     const VertexHistory& historyOf(uint32_t v) const { return history_[v]; }
     OctNormal normalOf(uint32_t v) const { return normal_[v]; }
 
 private:
     float precisionAt(const CollapseStep& step, uint32_t end) const;
     void recordDummy(const CollapseStep& step, uint32_t end);
-    void push(const CollapseRecord& record);
+    void push(uint32_t v, CollapseLink link, CollapseRecord record);
+    void gatherRing(const CollapseStep& step, CollapseRecord& record) const;
     uint32_t heightOf(uint32_t v) const { return history_[v].height; }
     Vec3i stepsOf(const WorkingMesh& mesh, const Vec3f& p) const;
 
@@ -86,6 +129,7 @@ private:
     std::vector<VertexHistory> history_;
     std::vector<float> error_before_;  // of what a vertex stands for, before this began
     uint32_t first_record_ = 0;
+    std::vector<CollapseLink> link_;
     std::vector<CollapseRecord> record_;
     uint32_t largest_ = 0;
     uint64_t dummies_ = 0;
@@ -94,7 +138,8 @@ private:
 
 /// All that was collapsed, and what remains. Vertices are numbers of any kind, below `vertices`.
 struct Collapses {
-    std::vector<CollapseRecord> record;  ///< children before parents
+    explicit Collapses(TempSpace& space) : store(space) {}
+    CollapseStore store;
     Mesh base;
     std::vector<uint32_t> base_vertex;  ///< the number of each
     std::vector<uint32_t> base_last;    ///< the record it came from last, or kNoOperation
