@@ -20,11 +20,14 @@ constexpr uint32_t kLocal = 1u << 31;
 /// What a vertex carries from diamond to diamond, in the place of scalars.
 struct VertexState {
     std::array<uint32_t, 2> key{};
+    uint32_t number = kNoVertex;  ///< of all vertices; given in its first diamond
     VertexHistory history;
 
     uint64_t name() const { return key[0] | uint64_t(key[1]) << 32; }
-    static VertexState of(uint64_t name, const VertexHistory& history) {
-        return {{uint32_t(name), uint32_t(name >> 32)}, history};
+    static VertexState of(uint64_t name) {
+        VertexState state;
+        state.key = {uint32_t(name), uint32_t(name >> 32)};
+        return state;
     }
 };
 constexpr size_t kStateFloats = sizeof(VertexState) / sizeof(float);
@@ -47,7 +50,9 @@ struct DiamondResult {
     std::vector<float> errors;
     std::vector<CollapseLink> link;
     std::vector<CollapseRecord> record;
-    std::vector<uint64_t> name;  ///< of the vertices that records mean
+    // One a vertex that records mean:
+    std::vector<VertexState> vertex;
+    std::vector<uint8_t> inside;  ///< Recorder::isInside()
     uint32_t largest_height = 0;
     uint64_t dummies = 0, input_triangles = 0;
     Recorder::Refused refused;
@@ -61,8 +66,7 @@ public:
     void begin() {
         mesh_.clear();
         label_.clear();
-        history_.clear();
-        name_.clear();
+        state_.clear();
         ids_.reserve(0);
     }
     void add(const Mesh& child, bool is_leaf, uint8_t label);
@@ -79,8 +83,7 @@ private:
     SimplifyOutput simplified_;
     Mesh mesh_;
     std::vector<uint8_t> label_;
-    std::vector<VertexHistory> history_;
-    std::vector<uint64_t> name_;
+    std::vector<VertexState> state_;
     KeyMap ids_;
     std::vector<uint32_t> local_;
 };
@@ -89,17 +92,17 @@ void Collapser::add(const Mesh& child, bool is_leaf, uint8_t label) {
     local_.resize(child.vertexCount());
     for (size_t v = 0; v < child.vertexCount(); ++v) {
         const VertexState state =
-            is_leaf ? VertexState::of(latticeKey(child.position[v]), {}) : stateOf(child, v);
+            is_leaf ? VertexState::of(latticeKey(child.position[v])) : stateOf(child, v);
         const auto [id, is_new] = ids_.insert(state.name(), uint32_t(mesh_.vertexCount()));
         local_[v] = id;
         if (!is_new) {
             CHECK(mesh_.position[id] == child.position[v]);
+            if (state.number != kNoVertex) state_[id] = state;
             continue;
         }
         mesh_.position.push_back(child.position[v]);
         mesh_.normal.push_back(child.normal[v]);
-        history_.push_back(state.history);
-        name_.push_back(state.name());
+        state_.push_back(state);
     }
     for (size_t t = 0; t < child.triangleCount(); ++t) {
         const Triangle& f = child.triangle[t];
@@ -116,7 +119,9 @@ void Collapser::run(std::span<const uint32_t> quota, float child_error, DiamondR
         result.errors.assign(quota.size(), 0);
         return;
     }
-    Recorder recorder(mesh_, history_, kLocal, shift_);
+    std::vector<VertexHistory> history;
+    for (const VertexState& state : state_) history.push_back(state.history);
+    Recorder recorder(mesh_, std::move(history), kLocal, shift_);
     SimplifyInput input;
     input.mesh = &mesh_;
     input.cell = label_;
@@ -128,7 +133,8 @@ void Collapser::run(std::span<const uint32_t> quota, float child_error, DiamondR
     takeApart(recorder, quota.size(), result);
     result.link = std::move(recorder.links());
     result.record = std::move(recorder.records());
-    result.name = name_;
+    result.vertex = state_;
+    for (uint32_t v = 0; v < state_.size(); ++v) result.inside.push_back(recorder.isInside(v));
     result.largest_height = recorder.largestHeight();
     result.dummies = recorder.dummies();
     result.refused = recorder.refused();
@@ -137,10 +143,10 @@ void Collapser::run(std::span<const uint32_t> quota, float child_error, DiamondR
 void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult& result) {
     const Mesh& mesh = simplified_.mesh;
     std::vector<uint32_t> survivor(mesh.vertexCount(), kNoVertex);
-    std::vector<uint8_t> gone(name_.size(), 0);
+    std::vector<uint8_t> gone(state_.size(), 0);
     for (const CollapseLink& link : recorder.links())
         if (link.u != kNoVertex) gone[link.u] = 1;
-    for (uint32_t v = 0; v < name_.size(); ++v)
+    for (uint32_t v = 0; v < state_.size(); ++v)
         if (!gone[v] && simplified_.vertex_map[v] != kNone) {
             CHECK_EQ(survivor[simplified_.vertex_map[v]], kNoVertex);
             survivor[simplified_.vertex_map[v]] = v;
@@ -159,7 +165,9 @@ void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult&
                     local_[at] = uint32_t(cell.vertexCount());
                     cell.position.push_back(mesh.position[at]);
                     cell.normal.push_back(recorder.normalOf(v));
-                    const VertexState state = VertexState::of(name_[v], recorder.historyOf(v));
+                    VertexState state = state_[v];
+                    state.history = recorder.historyOf(v);
+                    state.number = v;  // of this diamond, until take()
                     cell.scalar.resize(cell.scalar.size() + kStateFloats);
                     std::memcpy(cell.scalar.data() + cell.scalar.size() - kStateFloats, &state,
                                 sizeof state);
@@ -192,7 +200,7 @@ public:
         progress_.beginStage("collapse", input_.leaves.triangles * 3);
         for (int level = input_.leaves.tree->deepestLevel(); level >= 0; --level) runLevel(level);
         runRoot();
-        out_.vertices = ids_;
+        out_.vertices = vertices_;
     }
 
 private:
@@ -204,10 +212,13 @@ private:
         worker.add(worker.scratch.mesh, cell.blob.store == &input_.store, label);
     }
     void take(DiamondResult& result);
-    uint32_t numberOf(uint64_t name) {
-        const auto [id, is_new] = id_of_.insert(name, ids_);
-        ids_ += is_new;
-        return id;
+    /// Only what other diamonds may have, too, must be looked up.
+    uint32_t numberOf(const VertexState& vertex, bool inside) {
+        if (vertex.number != kNoVertex) return vertex.number;
+        if (inside) return vertices_++;
+        const auto [number, is_new] = number_of_.insert(vertex.name(), vertices_);
+        vertices_ += is_new;
+        return number;
     }
     static uint32_t globalRecord(uint32_t record, uint32_t first) {
         return record == kNoOperation || record < kLocal ? record : first + (record - kLocal);
@@ -222,8 +233,8 @@ private:
     PerThread<Collapser> workers_;
     std::unordered_map<CellId, Cell> below_, cells_;
     std::unique_ptr<CellStore> store_below_, store_;
-    KeyMap id_of_;
-    uint32_t ids_ = 0;
+    KeyMap number_of_;
+    uint32_t vertices_ = 0;
 };
 
 void LevelCollapser::runLevel(int level) {
@@ -274,27 +285,23 @@ DiamondResult LevelCollapser::runDiamond(const LevelItem& item, int level) {
 void LevelCollapser::take(DiamondResult& result) {
     const uint32_t first = out_.store.size();
     CHECK_LT(first + result.record.size(), size_t(kLocal));
-    std::vector<uint32_t> id(result.name.size(), kNoVertex);
-    for (CollapseLink& link : result.link) {
-        if (link.u == kNoVertex) continue;
-        id[link.u] = numberOf(result.name[link.u]);
-        link.u = id[link.u];
-    }
+    std::vector<uint32_t> number;
+    for (size_t v = 0; v < result.vertex.size(); ++v)
+        number.push_back(numberOf(result.vertex[v], result.inside[v]));
     for (size_t i = 0; i < result.record.size(); ++i) {
+        CollapseLink& link = result.link[i];
         CollapseRecord& r = result.record[i];
-        for (uint8_t k = 0; k < r.ring_size; ++k) {
-            uint32_t& v = r.ring[k];
-            if (id[v] == kNoVertex) id[v] = numberOf(result.name[v]);
-            v = id[v];
-        }
-        for (uint32_t& child : result.link[i].child) child = globalRecord(child, first);
-        out_.store.append(result.link[i], r);
+        if (link.u != kNoVertex) link.u = number[link.u];
+        for (uint32_t& child : link.child) child = globalRecord(child, first);
+        for (uint8_t k = 0; k < r.ring_size; ++k) r.ring[k] = number[r.ring[k]];
+        out_.store.append(link, r);
     }
     for (size_t c = 0; c < result.ids.size(); ++c) {
         Mesh& mesh = result.cells[c].mesh;
         for (size_t v = 0; v < mesh.vertexCount(); ++v) {
             VertexState state = stateOf(mesh, v);
             state.history.last = globalRecord(state.history.last, first);
+            state.number = number[state.number];
             std::memcpy(&mesh.scalar[kStateFloats * v], &state, sizeof state);
         }
         cells_[result.ids[c]] = {store_->put(result.cells[c]), result.errors[c]};
@@ -327,7 +334,7 @@ void LevelCollapser::runRoot() {
     out_.base = std::move(result.cells[0].mesh);
     for (size_t v = 0; v < out_.base.vertexCount(); ++v) {
         const VertexState state = stateOf(out_.base, v);
-        out_.base_vertex.push_back(numberOf(state.name()));
+        out_.base_vertex.push_back(state.number);
         out_.base_last.push_back(state.history.last);
     }
     out_.base.scalar.clear();

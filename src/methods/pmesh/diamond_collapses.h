@@ -15,8 +15,8 @@
 
 namespace pietra::pmesh {
 
-/// Consumes the leaves; `out` is empty. Memory beside the diamonds at work: that of a table of
-/// names, about 50 bytes a vertex.
+/// Consumes the leaves; `out` is empty. Memory beside the diamonds at work: a table of the vertices
+/// that lay on a diamond's border when they first came, about three bytes a triangle.
 void collapseByDiamonds(InputLeaves& input, uint32_t patch_triangles, int jobs, TempSpace& space,
                         Progress& progress, Collapses& out);
 

@@ -34,8 +34,8 @@ struct FromBelow {
 
 class Encoder {
 public:
-    Encoder(const Collapses& collapses, const Packing& packing, BuildCounts& counts,
-            const NodeSink& sink, NodeForest& forest)
+    Encoder(const Collapses& collapses, Packing& packing, BuildCounts& counts, const NodeSink& sink,
+            NodeForest& forest)
         : collapses_(collapses),
           packing_(packing),
           counts_(counts),
@@ -73,7 +73,7 @@ private:
     void bound(NodeIndex n, const Work& work);
 
     const Collapses& collapses_;
-    const Packing& packing_;
+    Packing& packing_;
     BuildCounts& counts_;
     const NodeSink& sink_;
     NodeForest& forest_;
@@ -85,15 +85,14 @@ void Encoder::makeBase() {
     forest_.base_triangle = base.triangle;
     forest_.base_operation = packing_.base_operation;
     forest_.row = packing_.row;
-    counts_.name_of.assign(collapses_.vertices, kNoVertex);
+    for (OperationId& maker : packing_.maker)
+        if (maker != kNoOperation) maker += uint32_t(base.vertexCount());
+    counts_.name_of = std::move(packing_.maker);
     for (uint32_t v = 0; v < base.vertexCount(); ++v) {
         const Vec3i p = base.position[v] >> forest_.lattice.shift;
         forest_.base_vertex.push_back({p.x, p.y, p.z, packNormal(base.normal[v])});
         counts_.name_of[collapses_.base_vertex[v]] = v;
     }
-    for (size_t v = 0; v < packing_.maker.size(); ++v)
-        if (packing_.maker[v] != kNoOperation)
-            counts_.name_of[v] = uint32_t(base.vertexCount()) + packing_.maker[v];
 }
 
 std::vector<FromBelow> Encoder::encodeNode(NodeIndex n, std::span<const FromAbove> frontier) {
@@ -252,6 +251,8 @@ NodeForest encode(const Collapses& collapses, const Lattice& lattice, TempSpace&
     counts.levels = collapses.largest_height;
     counts.dummies = collapses.dummies;
     counts.operations = collapses.store.size();
+    const Reservation names = space.budget->reserve(sizeof(OperationId) * collapses.vertices,
+                                                    "the names of all vertices of a mesh");
     Packing packing(space);
     packCollapses(collapses, packing);
     NodeForest forest;

@@ -6,7 +6,7 @@
 // with the collapse: so no mesh is needed, and nodes are encoded down one path of the tree after
 // another.
 //
-// The output depends on the collapses alone. Memory: eight bytes a vertex, and the nodes of a path;
+// The output depends on the collapses alone. Memory: four bytes a vertex, and the nodes of a path;
 // collapses and slots lie in temporary space.
 
 #include <functional>

@@ -134,6 +134,8 @@ void Recorder::gatherRing(const CollapseStep& step, CollapseRecord& r) const {
 
 bool Recorder::take(const CollapseStep& step) {
     const uint32_t u = step.u, v = step.v;
+    for (size_t w = inside_.size(); w < history_.size(); ++w)
+        inside_.push_back(step.mesh.point[w].rank() != kRankFixed);
     const uint32_t rank = std::max(step.mesh.point[u].rank(), step.mesh.point[v].rank());
     if (rank == kRankFixed || (!irregular_.empty() && (irregular_[u] || irregular_[v])))
         return ++refused_.irregular, false;

@@ -114,6 +114,8 @@ public:
     const Refused& refused() const { return refused_; }
     const VertexHistory& historyOf(uint32_t v) const { return history_[v]; }
     OctNormal normalOf(uint32_t v) const { return normal_[v]; }
+    /// Has all its triangles in this mesh. Known only once a collapse was offered; else false.
+    bool isInside(uint32_t v) const { return !inside_.empty() && inside_[v]; }
 
 private:
     float precisionAt(const CollapseStep& step, uint32_t end) const;
@@ -127,6 +129,7 @@ private:
     int shift_;
     std::vector<OctNormal> normal_;
     std::vector<VertexHistory> history_;
+    std::vector<uint8_t> inside_;
     std::vector<float> error_before_;  // of what a vertex stands for, before this began
     uint32_t first_record_ = 0;
     std::vector<CollapseLink> link_;
