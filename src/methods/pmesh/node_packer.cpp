@@ -58,9 +58,9 @@ public:
         CHECK_LE(trees.size(), size_t(2 * kNodeSlots));
         return cutWithin(trees, trees.size() < kNodeSlots ? 1 : trees.size() - kNodeSlots);
     }
-    /// Sides may have any number of subtrees.
+    /// Sides may have any number of subtrees, but none just a few: there are to be few roots.
     const std::vector<uint8_t>& cutFreely(std::span<const Subtree> trees) {
-        return cutWithin(trees, 1);
+        return cutWithin(trees, trees.size() / 4);
     }
 
 private:
