@@ -4,16 +4,9 @@
 #include <mutex>
 
 #include "base/check.h"
+#include "base/disjoint_sets.h"
 
 namespace pietra {
-
-namespace {
-
-EdgeKey edgeOf(uint64_t a, uint64_t b) {
-    return {std::min(a, b), std::max(a, b)};
-}
-
-}  // namespace
 
 BorderChains::BorderChains(std::span<const EdgeKey> border, Budget& budget)
     : reservation_(budget.reserve(border.size() * 40, "the border chains of the input")) {
@@ -40,70 +33,30 @@ uint32_t BorderChains::find(uint64_t key) const {
     return it != vertex_.end() && *it == key ? uint32_t(it - vertex_.begin()) : kNone;
 }
 
-/// Goes along all chains and lists the pairs of consecutive kept vertices.
-class BorderChains::Walk {
-public:
-    Walk(const BorderChains& chains, const std::vector<uint8_t>& kept)
-        : chains_(chains), kept_(kept), walked_(chains.neighbour_.size(), 0) {}
-
-    std::vector<EdgeKey> pieces() {
-        // Loops have no end to start from, so they come last, from a kept vertex each.
-        for (uint32_t v = 0; v < kept_.size(); ++v)
-            if (chains_.degree(v) != 2) walkFrom(v);
-        for (uint32_t v = 0; v < kept_.size(); ++v)
-            if (kept_[v]) walkFrom(v);
-        std::sort(pieces_.begin(), pieces_.end());
-        return std::move(pieces_);
-    }
-
-private:
-    void walkFrom(uint32_t start) {
-        for (uint32_t e = chains_.begin_[start]; e < chains_.begin_[start + 1]; ++e)
-            if (!walked_[e]) walkChain(start, e);
-    }
-
-    void walkChain(uint32_t start, uint32_t edge) {
-        uint32_t last = kept_[start] ? start : kNone;
-        uint32_t at = start;
-        do {
-            const uint32_t next = chains_.neighbour_[edge];
-            walked_[edge] = walked_[edgeFrom(next, at)] = 1;
-            if (kept_[next]) {
-                if (last != kNone)
-                    pieces_.push_back(edgeOf(chains_.vertex_[last], chains_.vertex_[next]));
-                last = next;
-            }
-            if (chains_.degree(next) == 2) edge = otherEdge(next, at);
-            at = next;
-        } while (at != start && chains_.degree(at) == 2);
-    }
-
-    uint32_t edgeFrom(uint32_t v, uint32_t to) const {
-        uint32_t e = chains_.begin_[v];
-        while (chains_.neighbour_[e] != to) ++e;
-        return e;
-    }
-
-    uint32_t otherEdge(uint32_t v, uint32_t from) const {
-        const uint32_t first = chains_.begin_[v];
-        return chains_.neighbour_[first] == from ? first + 1 : first;
-    }
-
-    const BorderChains& chains_;
-    const std::vector<uint8_t>& kept_;
-    std::vector<uint8_t> walked_;  // of each direction of each edge
-    std::vector<EdgeKey> pieces_;
-};
-
 uint64_t BorderChains::countStray(std::span<const EdgeKey> cut_border) const {
     std::vector<uint8_t> kept(vertex_.size(), 0);
     for (const EdgeKey& edge : cut_border)
         for (const uint64_t key : edge)
             if (const uint32_t v = find(key); v != kNone) kept[v] = 1;
-    const std::vector<EdgeKey> pieces = Walk(*this, kept).pieces();
+    DisjointSets dropped(vertex_.size());
+    for (uint32_t v = 0; v < vertex_.size(); ++v)
+        for (const uint32_t w : neighboursOf(v))
+            if (!kept[v] && !kept[w]) dropped.unite(v, w);
+    const auto hasWay = [&](uint32_t p, uint32_t q) {
+        if (p == kNone || q == kNone) return false;
+        std::vector<uint32_t> sets;
+        for (const uint32_t v : neighboursOf(p)) {
+            if (v == q) return true;
+            if (!kept[v]) sets.push_back(dropped.root(v));
+        }
+        std::sort(sets.begin(), sets.end());
+        const std::span<const uint32_t> ends = neighboursOf(q);
+        return std::any_of(ends.begin(), ends.end(), [&](uint32_t v) {
+            return !kept[v] && std::binary_search(sets.begin(), sets.end(), dropped.root(v));
+        });
+    };
     uint64_t stray = 0;
-    for (const EdgeKey& edge : cut_border)
-        stray += !std::binary_search(pieces.begin(), pieces.end(), edge);
+    for (const EdgeKey& edge : cut_border) stray += !hasWay(find(edge[0]), find(edge[1]));
     return stray;
 }
 

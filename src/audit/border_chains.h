@@ -1,11 +1,9 @@
 #pragma once
-// Whether the border of a cut is made of the input's own: each border edge of a cut must join two
-// consecutive kept vertices of one border chain of the input. Otherwise a crack could pass for a
-// border.
+// Whether the border of a cut is made of the input's own: each of its edges must stand for a way
+// along border edges of the input, past vertices that are not kept only. Kept are those in which
+// border edges of the cut end. Otherwise a crack could pass for a border.
 //
-// The border edges of the input form a graph; a chain is a path of it through vertices where two
-// border edges meet, from one other vertex to another, or a closed loop. Kept are the vertices that
-// border edges of the cut end in. Memory: some 40 bytes an input border edge, from the budget.
+// Memory: some 40 bytes an input border edge, from the budget.
 
 #include <cstdint>
 #include <span>
@@ -23,16 +21,17 @@ public:
     /// MemoryError.
     BorderChains(std::span<const EdgeKey> border, Budget& budget);
 
-    /// How many of a cut's border edges are no piece of a chain. The order does not matter. Takes
-    /// 24 bytes a border edge of the cut and 16 a vertex of the chains, for a while. Thread-safe.
+    /// How many of a cut's border edges stand for no such way. The order does not matter. Takes
+    /// 5 bytes a vertex of the chains, for a while. Thread-safe.
     uint64_t countStray(std::span<const EdgeKey> cut_border) const;
 
 private:
     static constexpr uint32_t kNone = ~uint32_t(0);
-    class Walk;
 
     uint32_t find(uint64_t key) const;
-    uint32_t degree(uint32_t v) const { return begin_[v + 1] - begin_[v]; }
+    std::span<const uint32_t> neighboursOf(uint32_t v) const {
+        return {neighbour_.data() + begin_[v], neighbour_.data() + begin_[v + 1]};
+    }
 
     Reservation reservation_;
     std::vector<uint64_t> vertex_;     // increasing
@@ -40,7 +39,7 @@ private:
     std::vector<uint32_t> neighbour_;  // indices into vertex_
 };
 
-/// As countCracks(), and border edges that are no piece of the input's chains count as cracked.
+/// As countCracks(), and border edges that do not follow the input's count as cracked.
 /// Keeps the border edges of the cut in memory, from the budget.
 CrackReport countCracksWithin(const BorderChains& chains, const PatchStream& stream,
                               std::span<const NodeIndex> nodes, Budget& budget, size_t memory_bytes,

@@ -137,13 +137,15 @@ TEST(BorderChains, piecesJoinConsecutiveKeptVertices) {
     EXPECT_EQ(stray(loop, {}), 0u);
 }
 
-TEST(BorderChains, endWhereBordersMeet) {
-    // Two loops that touch in 5: pieces must not pass through it.
+TEST(BorderChains, piecesPassWhereBordersMeetIfThatIsNotKept) {
+    // Two loops that touch in 5.
     std::vector<EdgeKey> eight = chain({5, 1, 2, 3}, true);
     for (const EdgeKey& e : chain({5, 6, 7, 8}, true)) eight.push_back(e);
     EXPECT_EQ(stray(eight, chain({5, 2, 3}, true)), 0u);
     EXPECT_EQ(stray(eight, {edge(1, 3)}), 0u);
-    EXPECT_EQ(stray(eight, {edge(1, 6)}), 1u);
+    EXPECT_EQ(stray(eight, {edge(1, 6)}), 0u);
+    EXPECT_EQ(stray(eight, {edge(1, 6), edge(5, 3)}), 1u);
+    EXPECT_EQ(stray(eight, {edge(2, 7), edge(3, 1)}), 1u);
     EXPECT_EQ(stray(eight, {edge(1, 3), edge(5, 8)}), 0u);
 }
 

@@ -2,31 +2,22 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
 
 #include "base/error.h"
+#include "base/scratch_directory.h"
 #include "runtime/export_cut.h"
 #include "store/terrain_model.h"
 
 namespace pietra {
 namespace {
 
-namespace fs = std::filesystem;
-
 class ModelCheckTest : public ::testing::Test {
 protected:
-    ModelCheckTest() {
-        std::string pattern = (fs::temp_directory_path() / "pietra-check-XXXXXX").string();
-        if (::mkdtemp(pattern.data()) == nullptr) std::abort();
-        directory_ = pattern;
-    }
-    ~ModelCheckTest() override { fs::remove_all(directory_); }
-    std::string pathTo(const std::string& name) const { return directory_ + "/" + name; }
+    std::string pathTo(const std::string& name) const { return scratch_.file(name); }
 
     ModelCheckReport check(const ToyTerrain& terrain, const std::string& input = "") const {
-        writeTerrainModel(terrain, pathTo("model"), directory_);
+        writeTerrainModel(terrain, pathTo("model"), scratch_.path());
         return checkFile(input);
     }
     ModelCheckReport checkFile(const std::string& input = "") const {
@@ -34,7 +25,7 @@ protected:
         ModelCheckSettings settings;
         settings.cuts = 12;
         settings.samples = 50'000;
-        settings.temp_dir = directory_;
+        settings.temp_dir = scratch_.path();
         if (!input.empty()) settings.input = {pathTo(input)};
         Budget budget(size_t(64) << 20);
         Progress progress;
@@ -48,10 +39,10 @@ protected:
         const auto writer = createMesh(pathTo(name), true, meshOutputOf(model.info(), cut.triangles));
         Budget budget(size_t(64) << 20);
         Progress progress;
-        exportCut(model, cut, *writer, {directory_, 2}, budget, progress);
+        exportCut(model, cut, *writer, {scratch_.path(), 2}, budget, progress);
     }
 
-    std::string directory_;
+    const ScratchDirectory scratch_;
 };
 
 TEST_F(ModelCheckTest, AGoodModelIsGoodAloneAndAgainstItsInput) {
@@ -72,7 +63,7 @@ TEST_F(ModelCheckTest, AGoodModelIsGoodAloneAndAgainstItsInput) {
 }
 
 TEST_F(ModelCheckTest, AnotherInputIsNoticed) {
-    writeTerrainModel(makeToyTerrain(), pathTo("model"), directory_);
+    writeTerrainModel(makeToyTerrain(), pathTo("model"), scratch_.path());
     const ModelReader model(pathTo("model"));
     // Leaves some triangles out, within the error that the coarser ones state.
     write("input.ply", cutByTriangles(model.nodes(), finestCut(model.nodes()).triangles - 1));
@@ -106,7 +97,7 @@ TEST_F(ModelCheckTest, ACrackIsNoticed) {
 }
 
 TEST_F(ModelCheckTest, NothingIsReadFromADamagedModel) {
-    writeTerrainModel(makeToyTerrain(), pathTo("model"), directory_);
+    writeTerrainModel(makeToyTerrain(), pathTo("model"), scratch_.path());
     std::fstream file(pathTo("model"), std::ios::in | std::ios::out | std::ios::binary);
     const ModelReader model(pathTo("model"));
     file.seekp(std::streamoff(model.page(0).offset + 3));

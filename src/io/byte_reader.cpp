@@ -28,13 +28,14 @@ void ByteReader::release() {
 }
 
 void ByteReader::fill() {
-    if (buffer_.empty()) buffer_.resize(window_ + kPadding);
-    std::memmove(buffer_.data(), data(), end_ - cursor_);
+    if (buffer_.empty()) buffer_.resize(kPadding + window_ + kPadding);
+    uint8_t* const window = buffer_.data() + kPadding;
+    std::memmove(window, data(), end_ - cursor_);
     base_ += cursor_;
     end_ -= cursor_;
     cursor_ = 0;
-    end_ += source_->read(base_ + end_, buffer_.data() + end_, window_ - end_);
-    std::memset(buffer_.data() + end_, 0, kPadding);
+    end_ += source_->read(base_ + end_, window + end_, window_ - end_);
+    std::memset(window + end_, 0, kPadding);
 }
 
 std::string ByteReader::placeOf(uint64_t offset) const {

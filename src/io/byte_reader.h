@@ -2,9 +2,8 @@
 // A window that slides over a ByteSource: what binary decoders and text scanners read through.
 //
 // The bytes from the cursor on lie in one piece, at least as many as were asked for (up to kWindow)
-// unless the file ends before. After the last byte of the file there are zero bytes in memory, so
-// that a scanner may look kPadding bytes ahead without asking. Memory: kWindow, once read from. Not
-// thread-safe.
+// unless the file ends before. Scanners may look kPadding bytes back and ahead without asking:
+// after the last byte there are zero bytes. Memory: kWindow, once read from. Not thread-safe.
 
 #include <cstddef>
 #include <cstdint>
@@ -37,7 +36,7 @@ public:
         if (end_ - cursor_ < want) fill();
         return end_ - cursor_;
     }
-    const uint8_t* data() const { return buffer_.data() + cursor_; }
+    const uint8_t* data() const { return buffer_.data() + kPadding + cursor_; }
     /// Moves the cursor over bytes that peek() has shown.
     void advance(size_t bytes) { cursor_ += bytes; }
     bool atEnd() { return peek(1) == 0; }
@@ -52,9 +51,9 @@ private:
     void fill();
 
     std::unique_ptr<ByteSource> source_;
-    size_t window_;  ///< kWindow, or the whole of a smaller file
-    std::vector<uint8_t> buffer_;
-    uint64_t base_ = 0;  ///< offset of buffer_[0]
+    size_t window_;                ///< kWindow, or the whole of a smaller file
+    std::vector<uint8_t> buffer_;  ///< the window between kPadding bytes on either side
+    uint64_t base_ = 0;            ///< offset of the window's first byte
     size_t cursor_ = 0;
     size_t end_ = 0;
 };

@@ -18,6 +18,7 @@ public:
         return file_.read(offset, data, bytes);
     }
     uint64_t lengthBound() const override { return file_.size(); }
+    const std::string& tempDir() const override { return file_.tempDir(); }
     uint64_t storedBytes() const override { return stored_bytes_; }
     bool isCompressed() const override { return false; }
     void release() override { file_.release(); }
@@ -40,12 +41,13 @@ public:
         return n;
     }
     uint64_t lengthBound() const override { return bytes_.size(); }
+    const std::string& tempDir() const override { return temp_dir_; }
     uint64_t storedBytes() const override { return bytes_.size(); }
     bool isCompressed() const override { return false; }
     std::unique_ptr<ByteSource> again() const override { return bytesInMemory(name_, bytes_); }
 
 private:
-    std::string name_;
+    std::string name_, temp_dir_ = ".";
     std::vector<uint8_t> bytes_;
 };
 

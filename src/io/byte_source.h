@@ -26,6 +26,8 @@ public:
     /// The number of plain bytes: exact where isCompressed() is false, else an upper bound that
     /// follows from the size of the file.
     virtual uint64_t lengthBound() const = 0;
+    /// The folder for temporary files.
+    virtual const std::string& tempDir() const = 0;
     /// Bytes on disk.
     virtual uint64_t storedBytes() const = 0;
     virtual bool isCompressed() const = 0;

@@ -11,6 +11,9 @@ namespace pietra {
 /// What some editors put before a text.
 inline constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
 
+/// What packers put behind the name of a file.
+inline constexpr const char* kPackedEndings[] = {".gz", ".xz", ".zst"};
+
 inline std::string_view withoutMark(std::string_view text) {
     if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
     return text;

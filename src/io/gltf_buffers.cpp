@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "io/file_signs.h"
 
 namespace pietra {
 
@@ -72,19 +73,19 @@ bool hasScheme(std::string_view uri) {
 /// Where a buffer lies.
 struct GltfBuffers::Place {
     enum Kind { kFile, kBeside, kBase64, kMemory } kind = kFile;
-    uint64_t offset = 0;                 ///< kFile, kBase64: of its first byte or character
-    uint64_t characters = 0;             ///< kBase64, without padding
-    std::string path;                    ///< kBeside
-    std::unique_ptr<ByteSource> memory;  ///< kMemory
-    uint64_t bytes = 0;                  ///< how many there are
+    uint64_t offset = 0;               ///< kFile, kBase64: of its first byte or character
+    uint64_t characters = 0;           ///< kBase64, without padding
+    std::string path;                  ///< kBeside
+    std::unique_ptr<ByteSource> held;  ///< kMemory, and of packed files beside it the copy
+    uint64_t bytes = 0;                ///< how many there are
 };
 
-GltfBuffers::GltfBuffers(std::unique_ptr<ByteSource> file, std::vector<GltfBuffer> buffers,
+GltfBuffers::GltfBuffers(std::unique_ptr<ByteSource> file, const GltfDocument& document,
                          std::optional<GltfChunk> chunk)
     : file_(std::move(file)),
-      buffers_(std::move(buffers)),
+      document_(document),
       chunk_(chunk),
-      places_(buffers_.size()),
+      places_(document.buffers.size()),
       stored_bytes_(file_->storedBytes()) {}
 
 GltfBuffers::~GltfBuffers() = default;
@@ -97,30 +98,30 @@ void GltfBuffers::require(uint32_t buffer) {
     if (places_[buffer]) return;
     auto place = std::make_unique<Place>(locate(buffer));
     if (place->kind == Place::kBeside) {
-        auto source = openBytes(place->path);
-        if (source->isCompressed())
-            throw InputError(place->path, "",
-                             "is compressed: its parts are read in turns, so unpack it first");
+        auto source = openBytes(place->path, file_->tempDir());
+        const bool packed = source->isCompressed();
+        if (packed) source = source->unpacked();
         place->bytes = source->lengthBound();
         stored_bytes_ += source->storedBytes();
+        if (packed) place->held = std::move(source);
     }
-    if (buffers_[buffer].bytes > place->bytes)
-        fail(
-            buffer, "byteLength",
-            fmt::format("counts {} bytes, but there are {}{}", buffers_[buffer].bytes, place->bytes,
-                        place->kind == Place::kBeside ? " in " + place->path : std::string()));
+    if (sizeOf(buffer) > place->bytes)
+        fail(buffer, "byteLength",
+             fmt::format("counts {} bytes, but there are {}{}", sizeOf(buffer), place->bytes,
+                         place->kind == Place::kBeside ? " in " + place->path : std::string()));
     places_[buffer] = std::move(place);
 }
 
 GltfBuffers::Place GltfBuffers::locate(uint32_t buffer) const {
     Place place;
-    if (!buffers_[buffer].uri) {
-        if (buffer != 0 || !chunk_) fail(buffer, "uri", "is missing, so its data is nowhere");
+    if (!document_.buffers[buffer].uri) {
+        if (buffer != 0 || !chunk_)
+            fail(buffer, "uri", "is missing, so its data is nowhere" + document_.whyMissing());
         place.offset = chunk_->offset;
         place.bytes = chunk_->bytes;
         return place;
     }
-    const std::string& uri = *buffers_[buffer].uri;
+    const std::string& uri = *document_.buffers[buffer].uri;
     if (uri.starts_with("data:")) return locateData(buffer, uri);
     const auto name = percentDecoded(uri);
     if (!name || name->empty() || hasScheme(uri) || uri.front() == '/' ||
@@ -128,6 +129,13 @@ GltfBuffers::Place GltfBuffers::locate(uint32_t buffer) const {
         fail(buffer, "uri", "is no name of a file beside the glTF file");
     place.kind = Place::kBeside;
     place.path = (std::filesystem::path(path()).parent_path() / *name).string();
+    std::error_code fault;
+    if (!std::filesystem::exists(place.path, fault))
+        for (const char* ending : kPackedEndings)
+            if (std::filesystem::exists(place.path + ending, fault)) {
+                place.path += ending;
+                break;
+            }
     return place;
 }
 
@@ -162,7 +170,7 @@ GltfBuffers::Place GltfBuffers::locateData(uint32_t buffer, const std::string& u
     decoded.resize(bytes);
     place.kind = Place::kMemory;
     place.bytes = bytes;
-    place.memory = bytesInMemory(path(), std::move(decoded));
+    place.held = bytesInMemory(path(), std::move(decoded));
     return place;
 }
 
@@ -186,10 +194,10 @@ void GltfBuffers::read(uint32_t buffer, uint64_t offset, uint8_t* out, size_t by
             done = file_->read(place.offset + offset, out, bytes);
             break;
         case Place::kBeside:
-            done = open(buffer).read(offset, out, bytes);
+            done = (place.held ? *place.held : open(buffer)).read(offset, out, bytes);
             break;
         case Place::kMemory:
-            done = place.memory->read(offset, out, bytes);
+            done = place.held->read(offset, out, bytes);
             break;
         case Place::kBase64:
             readBase64(place, offset, out, bytes);

@@ -1,8 +1,9 @@
 #pragma once
 // The bytes of a glTF file's buffers, wherever they are: in the chunk behind the JSON of a GLB, in
 // files beside it, or in the JSON itself as base64. They are read by ranges, through a few cached
-// ones; no buffer is held whole but short ones out of the JSON. Memory: kWindows ranges. At most
-// kOpenFiles files are open. Not thread-safe.
+// ones; no buffer is held whole but short ones out of the JSON. Packed files beside it are copied
+// to temporary ones, in the folder of the glTF file's own. Memory: kWindows ranges. At most
+// kOpenFiles files are open, and the copies. Not thread-safe.
 
 #include <cstddef>
 #include <cstdint>
@@ -23,8 +24,8 @@ struct GltfChunk {
 
 class GltfBuffers {
 public:
-    /// `buffers` as in the document; the first one without a uri is the chunk.
-    GltfBuffers(std::unique_ptr<ByteSource> file, std::vector<GltfBuffer> buffers,
+    /// Those of `document`, which must outlive this; the first one without a uri is the chunk.
+    GltfBuffers(std::unique_ptr<ByteSource> file, const GltfDocument& document,
                 std::optional<GltfChunk> chunk);
     ~GltfBuffers();
 
@@ -33,8 +34,8 @@ public:
     /// Makes sure that buffer number `buffer` is there, of the size that the document says: before
     /// it is read. Throws InputError, or IoError that names the file missing.
     void require(uint32_t buffer);
-    uint64_t sizeOf(uint32_t buffer) const { return buffers_[buffer].bytes; }
-    size_t count() const { return buffers_.size(); }
+    uint64_t sizeOf(uint32_t buffer) const { return document_.buffers[buffer].bytes; }
+    size_t count() const { return document_.buffers.size(); }
     /// Bytes on disk of the file and those beside it that were required.
     uint64_t storedBytes() const { return stored_bytes_; }
 
@@ -68,7 +69,7 @@ private:
     [[noreturn]] void fail(uint32_t buffer, const char* key, const std::string& what) const;
 
     std::unique_ptr<ByteSource> file_;
-    std::vector<GltfBuffer> buffers_;
+    const GltfDocument& document_;
     std::optional<GltfChunk> chunk_;
     std::vector<std::unique_ptr<Place>> places_;  ///< of the buffers that were required
     std::vector<OpenFile> open_;                  ///< the one used last at the end

@@ -78,7 +78,8 @@ GltfColumn::GltfColumn(const GltfDocument& document, GltfBuffers& buffers, uint3
     } else {
         base_.stride = bytes;
         if (a.sparse == kGltfNone)
-            throw InputError(buffers.path(), name_ + ".bufferView", "is missing");
+            throw InputError(buffers.path(), name_ + ".bufferView",
+                             "is missing" + document.whyMissing());
         // note: nothing but a number backs the zeros, so that it might be any.
         uint64_t most = 0;
         for (const GltfBuffer& b : document.buffers) most += std::min(b.bytes, UINT64_MAX - most);

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "io/gltf_text.h"
+#include "io/notes.h"
 
 namespace pietra {
 
@@ -22,19 +23,14 @@ constexpr std::string_view kHarmless[] = {"KHR_mesh_quantization", "KHR_lights_p
 constexpr std::string_view kHarmlessPrefixes[] = {"KHR_materials_", "KHR_texture_", "EXT_texture_",
                                                   "MSFT_texture_",  "EXT_lights_",  "KHR_xmp_"};
 
+/// Has a note of its own.
+constexpr const char* kInstances = "EXT_mesh_gpu_instancing";
+
 bool isHarmless(const std::string& extension) {
     return std::find(std::begin(kHarmless), std::end(kHarmless), extension) !=
                std::end(kHarmless) ||
            std::any_of(std::begin(kHarmlessPrefixes), std::end(kHarmlessPrefixes),
                        [&](std::string_view prefix) { return extension.starts_with(prefix); });
-}
-
-/// Text of a file as it may stand in a message.
-std::string shown(const std::string& text) {
-    std::string out = text.substr(0, 80);
-    for (char& c : out)
-        if (c < ' ' || c > '~') c = '?';
-    return out;
 }
 
 /// An object of the JSON and where it stands.
@@ -168,7 +164,7 @@ public:
             if (section_ == "skins") leaveOut(GltfLeftOut::kSkins);
             if (section_ == "animations") leaveOut(GltfLeftOut::kAnimations);
             return table_ || section_ == "asset" || section_ == "scene" ||
-                   section_ == "extensionsRequired";
+                   section_ == "extensionsRequired" || section_ == "extensionsUsed";
         }
         if (depth == 0 && (event == Event::value || event == Event::array_start))
             throw InputError(file_, "", "its JSON is no object");
@@ -210,7 +206,7 @@ private:
             const std::string& version = asset.text("version", asset.get("version"));
             if (!version.starts_with("2."))
                 asset.fail("version",
-                           fmt::format("Pietra reads glTF 2, not \"{}\"", shown(version)));
+                           fmt::format("Pietra reads glTF 2, not \"{}\"", printable(version)));
             has_version_ = true;
         } else if (section_ == "scene") {
             if (!value.is_number_unsigned()) throw InputError(file_, section_, "is no index");
@@ -224,13 +220,17 @@ private:
             (this->*table_)(Item(file_, fmt::format("{}[{}]", section_, entry_++), value));
             return false;
         }
-        if (section_ == "extensionsRequired" && value.is_string() &&
-            !isHarmless(value.get<std::string>()))
+        const bool required = section_ == "extensionsRequired";
+        if (!value.is_string() || (!required && section_ != "extensionsUsed")) return true;
+        const auto& name = value.get_ref<const std::string&>();
+        if (isHarmless(name)) return false;
+        if (required)
             throw InputError(file_, section_,
                              fmt::format("Pietra does not know the extension {}, without which "
                                          "the file cannot be read",
-                                         shown(value.get<std::string>())));
-        return true;
+                                         printable(name)));
+        if (name != kInstances) document_.unknown.push_back(name);
+        return false;
     }
 
     void leaveOut(GltfLeftOut what) { document_.left_out[size_t(what)] = true; }
@@ -266,7 +266,7 @@ private:
         for (int i = 0; i < 4; ++i)
             if (type == kTypes[i]) accessor.components = uint8_t(i + 1);
         if (accessor.components == 0 && !type.starts_with("MAT"))
-            item.fail("type", fmt::format("\"{}\" is none of glTF", shown(type)));
+            item.fail("type", fmt::format("\"{}\" is none of glTF", printable(type)));
         if (item.find("sparse")) {
             accessor.sparse = uint32_t(document_.sparse.size());
             document_.sparse.push_back(sparseOf(item.inner("sparse")));
@@ -332,8 +332,7 @@ private:
             break;
         }
         const Json* extensions = item.find("extensions");
-        if (extensions && extensions->is_object() &&
-            extensions->contains("EXT_mesh_gpu_instancing"))
+        if (extensions && extensions->is_object() && extensions->contains(kInstances))
             leaveOut(GltfLeftOut::kGpuInstances);
         document_.nodes.push_back(std::move(node));
     }
@@ -361,6 +360,11 @@ size_t bytesOf(GltfComponent component) {
         default:
             return 4;
     }
+}
+
+std::string GltfDocument::whyMissing() const {
+    if (unknown.empty()) return "";
+    return fmt::format(" (the file uses {}, which Pietra does not know)", listed(unknown));
 }
 
 GltfDocument readGltfDocument(ByteReader& reader, uint64_t begin, uint64_t end) {

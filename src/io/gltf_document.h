@@ -101,6 +101,10 @@ struct GltfDocument {
     std::vector<std::vector<uint32_t>> scenes;  ///< their root nodes
     std::optional<uint64_t> scene;
     std::array<bool, size_t(GltfLeftOut::kCount)> left_out{};
+    std::vector<std::string> unknown;  ///< extensions that the file uses without requiring them
+
+    /// What to say where data is missing: " (...)" with those that may have it, or "".
+    std::string whyMissing() const;
 };
 
 /// Parses the JSON at [begin, end) of the file. Throws InputError, also for another version and for

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "io/gltf_column.h"
+#include "io/notes.h"
 
 namespace pietra {
 
@@ -351,11 +352,9 @@ private:
         for (size_t i = 0; i < document_.left_out.size(); ++i)
             if (document_.left_out[i]) names.push_back(kNames[i]);
         if (!names.empty()) {
-            std::string list = names.front();
-            for (size_t i = 1; i < names.size(); ++i)
-                list += (i + 1 < names.size() ? ", " : " and ") + names[i];
-            note(list + " are left out");
+            note(listed(names) + " are left out");
         }
+        if (!document_.unknown.empty()) note(leftOut("extension", document_.unknown));
         if (points_or_lines_ > 0)
             note(fmt::format("{} primitives of points or lines are left out", points_or_lines_));
         if (without_positions_ > 0)

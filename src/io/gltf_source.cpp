@@ -106,7 +106,7 @@ public:
     GltfSource(GltfDocument document, std::unique_ptr<ByteSource> file,
                std::optional<GltfChunk> chunk, std::vector<std::string> notes)
         : document_(std::move(document)),
-          buffers_(std::move(file), document_.buffers, chunk),
+          buffers_(std::move(file), document_, chunk),
           scene_(makeGltfScene(document_, buffers_)),
           notes_(std::move(notes)) {
         notes_.insert(notes_.end(), scene_.notes.begin(), scene_.notes.end());

@@ -8,8 +8,8 @@
 // scalars NAME, in the order of their names. Data that the file does not hold, such as by required
 // extensions, is an error; looks and movement are left out with a note.
 //
-// Memory: the JSON's entries, some windows of 256 KiB and the caller's batch. Files that are
-// compressed as a whole are refused, for their parts are read in turns.
+// Memory: the JSON's entries, some windows of 256 KiB and the caller's batch. Packed files, also
+// those beside it, are copied to temporary ones, for their parts are read in turns.
 
 #include <memory>
 

@@ -2,6 +2,7 @@
 
 #include "io/gltf_source.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -16,18 +17,9 @@ namespace pietra {
 namespace {
 
 using Json = nlohmann::json;
-using Soup = std::vector<std::array<Vec3d, 3>>;
 
 float noise(uint64_t i) {
     return float(int64_t(mixBits(i + 1)) >> 40) * 0x1p-23f;
-}
-
-Soup soupOf(const WholeMesh& mesh) {
-    Soup soup;
-    for (const auto& t : mesh.triangles)
-        soup.push_back({mesh.vertices.position[t[0]], mesh.vertices.position[t[1]],
-                        mesh.vertices.position[t[2]]});
-    return soup;
 }
 
 template <class T>
@@ -733,12 +725,45 @@ TEST(GltfSource, survivesAnyChangeOfAByte) {
         }
 }
 
-TEST(GltfSource, refusesPackedFilesBesideIt) {
+TEST(GltfSource, readsPackedFilesBesideIt) {
     const ScratchDirectory dir;
     const Builder b = triangle();
-    const std::string data = dir.write("data.bin", gzipped(b.data));
-    EXPECT_EQ(faultOf(dir.write("a.gltf", b.gltf("data.bin"))),
-              data + ": is compressed: its parts are read in turns, so unpack it first");
+    const std::string plain = dir.write("plain.bin", b.data), packed = gzipped(b.data);
+    const WholeMesh expected = readWhole(dir.write("a.gltf", b.gltf("plain.bin")));
+    dir.write("data.bin", packed);
+    dir.write("other.bin.gz", packed);
+    for (const char* uri : {"data.bin", "other.bin", "other.bin.gz"}) {
+        const std::string path = dir.write("a.gltf", b.gltf(uri));
+        expectSameMesh(readWhole(path), expected);
+        EXPECT_EQ(openSource({path})->inputBytes(), b.gltf(uri).size() + packed.size());
+    }
+    const std::string cut = dir.write("cut.bin", packed.substr(0, packed.size() - 9));
+    EXPECT_EQ(faultOf(dir.write("a.gltf", b.gltf("cut.bin"))),
+              fmt::format("{}: byte {}: the gzip data ends early", cut, packed.size() - 9));
+}
+
+TEST(GltfSource, namesExtensionsThatItDoesNotKnow) {
+    const ScratchDirectory dir;
+    Builder b = triangle();
+    b.json["extensionsUsed"] = {"KHR_draco_mesh_compression", "KHR_materials_unlit",
+                                "EXT_mesh_gpu_instancing", "KHR_mesh_quantization"};
+    EXPECT_EQ(readWhole(dir.write("a.glb", b.glb())).notes,
+              std::vector<std::string>{"extension KHR_draco_mesh_compression is left out"});
+    b.json["extensionsUsed"].push_back("EXT_meshopt_compression");
+    EXPECT_EQ(readWhole(dir.write("a.glb", b.glb())).notes,
+              std::vector<std::string>{"extensions KHR_draco_mesh_compression and "
+                                       "EXT_meshopt_compression are left out"});
+    b.json["extensionsUsed"].erase(4);
+    const std::string why =
+        " (the file uses KHR_draco_mesh_compression, which Pietra does not know)";
+    Builder nowhere = b;
+    nowhere.json["accessors"][0].erase("bufferView");
+    const std::string path = dir.write("b.glb", nowhere.glb());
+    EXPECT_EQ(faultOf(path), path + ": accessors[0].bufferView: is missing" + why);
+    Json text = Json::parse(b.gltf("data.bin"));
+    text["buffers"][0].erase("uri");
+    EXPECT_EQ(faultOf(dir.write("b.gltf", text.dump())),
+              dir.file("b.gltf") + ": buffers[0].uri: is missing, so its data is nowhere" + why);
 }
 
 TEST(GltfSource, readsLargeFilesInLittleMemory) {

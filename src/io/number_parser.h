@@ -17,35 +17,54 @@ inline bool isDigit(char c) {
 }
 
 namespace detail {
-/// The number that eight digits make; bytes from 0 to 9, the first digit lowest.
-constexpr uint64_t joinDigits(uint64_t digits) {
-    digits = (digits * 10 + (digits >> 8)) & 0x00ff00ff00ff00ff;
-    digits = (digits * 100 + (digits >> 16)) & 0x0000ffff0000ffff;
-    return uint32_t(digits * 10000 + (digits >> 32));
+inline __m128i loadSixteen(const void* from) {
+    return _mm_loadu_si128(static_cast<const __m128i*>(from));
+}
+/// Which of 16 bytes are at most `most`.
+inline uint32_t areUpTo(char most, __m128i bytes) {
+    const __m128i least = _mm_min_epu8(bytes, _mm_set1_epi8(most));
+    return uint32_t(_mm_movemask_epi8(_mm_cmpeq_epi8(least, bytes)));
+}
+/// Ones in the last `count` of 16 bytes.
+inline __m128i lastBytes(int count) {
+    alignas(16) static constexpr auto kBytes = [] {
+        std::array<uint8_t, 32> bytes{};
+        for (size_t i = 16; i < 32; ++i) bytes[i] = 0xff;
+        return bytes;
+    }();
+    return loadSixteen(kBytes.data() + count);
+}
+
+/// The number that 16 digits make; bytes from 0 to 9.
+inline uint64_t joinSixteen(__m128i digits) {
+    const auto weights = [](short first, short second) {
+        return _mm_set1_epi32(int(uint32_t(second) << 16 | uint32_t(first)));
+    };
+    const __m128i zero = _mm_setzero_si128();
+    const __m128i twos =
+        _mm_packs_epi32(_mm_madd_epi16(_mm_unpacklo_epi8(digits, zero), weights(10, 1)),
+                        _mm_madd_epi16(_mm_unpackhi_epi8(digits, zero), weights(10, 1)));
+    const __m128i fours = _mm_madd_epi16(twos, weights(100, 1));
+    const __m128i eights = _mm_madd_epi16(_mm_packs_epi32(fours, fours), weights(10000, 1));
+    const auto both = uint64_t(_mm_cvtsi128_si64(eights));
+    return uint32_t(both) * uint64_t(100000000) + (both >> 32);
 }
 
 /// Moves over the digits at `p` and appends them to `value`, modulo 2^64: up to 16 at once, as the
-/// processor seldom guesses where the digits of a fraction end. `end`: as for parseReal().
-inline const char* takeDigits(const char* p, const char* end, uint64_t& value) {
+/// processor seldom guesses where the digits of a fraction end.
+inline const char* takeDigits(const char* p, uint64_t& value) {
     constexpr auto kPower = [] {
         std::array<uint64_t, 17> powers{1};
         for (size_t i = 1; i < powers.size(); ++i) powers[i] = 10 * powers[i - 1];
         return powers;
     }();
-    if (end - p >= 16) {
-        const __m128i text = _mm_loadu_si128(reinterpret_cast<const __m128i*>(p));
-        const __m128i digits = _mm_xor_si128(text, _mm_set1_epi8('0'));
-        const __m128i are_digits = _mm_cmpeq_epi8(_mm_min_epu8(digits, _mm_set1_epi8(9)), digits);
-        const int count = std::countr_one(uint32_t(_mm_movemask_epi8(are_digits)));
-        if (count == 0) return p;
-        // Zeros go before the digits.
-        const auto all = std::bit_cast<unsigned __int128>(digits) << 8 * (16 - count);
-        value = value * kPower[size_t(count)] + joinDigits(uint64_t(all)) * kPower[8] +
-                joinDigits(uint64_t(all >> 64));
-        p += count;
-        if (count < 16) return p;
-    }
-    for (; isDigit(*p); ++p) value = value * 10 + uint64_t(*p - '0');
+    const __m128i zeros = _mm_set1_epi8('0');
+    const int count = std::countr_one(areUpTo(9, _mm_xor_si128(loadSixteen(p), zeros)));
+    p += count;
+    const __m128i digits = _mm_xor_si128(loadSixteen(p - 16), zeros);
+    value = value * kPower[size_t(count)] + joinSixteen(_mm_and_si128(lastBytes(count), digits));
+    if (count == 16)
+        for (; isDigit(*p); ++p) value = value * 10 + uint64_t(*p - '0');
     return p;
 }
 
@@ -80,6 +99,57 @@ inline double divideByPowerOfTen(uint64_t mantissa, int power) {
            std::bit_cast<double>(uint64_t(1023 + exponent) << 52);
 }
 
+/// The number after the 'e' at `p` is added to `exponent`; returns the character after it, or `p`
+/// where there is none.
+inline const char* takeExponent(const char* p, int64_t& exponent) {
+    const char* q = p + 1;
+    const bool down = *q == '-';
+    if (*q == '-' || *q == '+') ++q;
+    if (!isDigit(*q)) return p;
+    int64_t power = 0;
+    for (; isDigit(*q); ++q)
+        if (power < 100000) power = power * 10 + (*q - '0');
+    exponent += down ? -power : power;
+    return q;
+}
+
+inline bool hasExactPower(int64_t exponent) {
+    return exponent >= -kLargestExactPower && exponent <= kLargestExactPower;
+}
+/// mantissa * 10^exponent, where hasExactPower(exponent) and the mantissa is at most 2^53: as both
+/// are exact, one rounding gives the right result (Clinger 1990).
+inline double exactReal(uint64_t mantissa, int64_t exponent, bool negative) {
+    const auto m = double(int64_t(mantissa));
+    const double magnitude = exponent <= 0 ? m / kExactPower[-exponent] : m * kExactPower[exponent];
+    return std::bit_cast<double>(std::bit_cast<uint64_t>(magnitude) | uint64_t(negative) << 63);
+}
+
+/// Moves over a number of up to 15 characters at `p`, but not its exponent; null where there is
+/// none or a longer one. Where the number ends is found first and by no branch: the next number
+/// waits for that alone.
+inline const char* takeShortDecimal(const char* p, uint64_t& mantissa, int64_t& exponent) {
+    const __m128i head = loadSixteen(p), zeros = _mm_set1_epi8('0');
+    // A number consists of what lies from '-' to '9', but for '/'.
+    const int size = std::countr_one(areUpTo('9' - '-', _mm_sub_epi8(head, _mm_set1_epi8('-'))));
+    const uint32_t here = (uint32_t(1) << size) - 1;
+    const uint32_t digits = areUpTo(9, _mm_xor_si128(head, zeros));
+    const bool negative = *p == '-';
+    const uint32_t point = ~digits & here & ~uint32_t(negative);
+    const int whole = std::countr_zero(point | 0x10000);
+    const int count = size - negative - (point != 0);
+    if (size == 16 || (point & (point - 1)) || (point && p[whole] != '.') || count == 0)
+        return nullptr;
+    // What stands before the point moves over it.
+    const int fraction = point ? size - whole - 1 : 16;
+    const __m128i tail = _mm_xor_si128(loadSixteen(p + size - 16), zeros);
+    const __m128i stays = lastBytes(fraction);
+    const __m128i joined =
+        _mm_or_si128(_mm_and_si128(stays, tail), _mm_andnot_si128(stays, _mm_slli_si128(tail, 1)));
+    mantissa = joinSixteen(_mm_and_si128(lastBytes(count), joined));
+    exponent = point ? -fraction : 0;
+    return p + size;
+}
+
 /// The power of ten of the first digit that is not zero, in an unsigned number.
 inline int64_t decimalExponent(const char* p, const char* end) {
     int64_t power = -1, first = 0;
@@ -106,6 +176,46 @@ inline int64_t decimalExponent(const char* p, const char* end) {
     }
     return (power >= 0 ? power : first) + exponent;
 }
+
+/// parseReal() for numbers of any length, in any form.
+inline const char* parseAnyReal(const char* text, const char* end, double& value) {
+    const char* const start = *text == '+' ? text + 1 : text;
+    const char* p = start;
+    const bool negative = *p == '-';
+    if (negative && start != text) return nullptr;
+    if (negative) ++p;
+    const char* const digits = p;
+    uint64_t mantissa = 0;
+    for (; isDigit(*p); ++p) mantissa = mantissa * 10 + uint64_t(*p - '0');
+    int64_t count = p - digits, exponent = 0;
+    if (*p == '.') {
+        const char* const fraction = ++p;
+        p = takeDigits(p, mantissa);
+        exponent = -(p - fraction);
+        count -= exponent;
+    }
+    if (count > 0 && count <= 19) {
+        if (*p == 'e' || *p == 'E') p = takeExponent(p, exponent);
+        if (mantissa <= uint64_t(1) << 53 && hasExactPower(exponent)) {
+            value = exactReal(mantissa, exponent, negative);
+            return p;
+        }
+        if (mantissa > 0 && exponent <= 0 && exponent >= -kLargestPowerOfFive) {
+            const double magnitude = divideByPowerOfTen(mantissa, int(-exponent));
+            value = negative ? -magnitude : magnitude;
+            return p;
+        }
+    }
+    const auto [rest, fault] = std::from_chars(start, end, value);
+    if (fault == std::errc::invalid_argument) return nullptr;
+    if (fault == std::errc::result_out_of_range) {
+        // from_chars leaves the value alone and does not say which way it went.
+        const bool small = decimalExponent(digits, rest) < 0;
+        const double magnitude = small ? 0.0 : __builtin_huge_val();
+        value = negative ? -magnitude : magnitude;
+    }
+    return rest;
+}
 }  // namespace detail
 
 /// Parses a whole number at `p`; returns the character after it, or null if there is none or it
@@ -125,62 +235,19 @@ inline const char* parseInteger(const char* p, int64_t& value) {
 }
 
 /// Parses a real number at `text` ("-1.5e-3", "nan", "inf" too); returns the character after it, or
-/// null if there is none. `end` is where the text ends; the byte there must be no digit. Too large
-/// or too small a number becomes infinite or zero.
+/// null if there is none. `end` is where the text ends; the byte there must be no digit. 16 bytes
+/// before the number and after `end` are read too. Too large or too small a number becomes infinite
+/// or zero.
 inline const char* parseReal(const char* text, const char* end, double& value) {
-    const char* const start = *text == '+' ? text + 1 : text;
-    const char* p = start;
-    const bool negative = *p == '-';
-    if (negative && start != text) return nullptr;
-    if (negative) ++p;
-    const char* const digits = p;
-    uint64_t mantissa = 0;
-    for (; isDigit(*p); ++p) mantissa = mantissa * 10 + uint64_t(*p - '0');
-    int64_t count = p - digits, exponent = 0;
-    if (*p == '.') {
-        const char* const fraction = ++p;
-        p = detail::takeDigits(p, end, mantissa);
-        exponent = -(p - fraction);
-        count -= exponent;
+    uint64_t mantissa;
+    int64_t exponent;
+    const char* p = detail::takeShortDecimal(text, mantissa, exponent);
+    if (p && (*p | 0x20) == 'e') p = detail::takeExponent(p, exponent);
+    if (p && detail::hasExactPower(exponent)) [[likely]] {
+        value = detail::exactReal(mantissa, exponent, *text == '-');
+        return p;
     }
-    if (count > 0 && count <= 19) {
-        if (*p == 'e' || *p == 'E') {
-            const char* q = p + 1;
-            const bool down = *q == '-';
-            if (*q == '-' || *q == '+') ++q;
-            if (isDigit(*q)) {
-                int64_t power = 0;
-                for (; isDigit(*q); ++q)
-                    if (power < 100000) power = power * 10 + (*q - '0');
-                exponent += down ? -power : power;
-                p = q;
-            }
-        }
-        // Both the mantissa and the power of ten are exact, so one rounding gives the right result
-        // (Clinger 1990).
-        if (mantissa <= uint64_t(1) << 53 && exponent >= -detail::kLargestExactPower &&
-            exponent <= detail::kLargestExactPower) {
-            const double m = double(mantissa);
-            const double magnitude = exponent < 0 ? m / detail::kExactPower[-exponent]
-                                                  : m * detail::kExactPower[exponent];
-            value = negative ? -magnitude : magnitude;
-            return p;
-        }
-        if (mantissa > 0 && exponent <= 0 && exponent >= -detail::kLargestPowerOfFive) {
-            const double magnitude = detail::divideByPowerOfTen(mantissa, int(-exponent));
-            value = negative ? -magnitude : magnitude;
-            return p;
-        }
-    }
-    const auto [rest, fault] = std::from_chars(start, end, value);
-    if (fault == std::errc::invalid_argument) return nullptr;
-    if (fault == std::errc::result_out_of_range) {
-        // from_chars leaves the value alone and does not say which way it went.
-        const bool small = detail::decimalExponent(digits, rest) < 0;
-        const double magnitude = small ? 0.0 : __builtin_huge_val();
-        value = negative ? -magnitude : magnitude;
-    }
-    return rest;
+    return detail::parseAnyReal(text, end, value);
 }
 
 }  // namespace pietra

@@ -24,10 +24,17 @@ double expected(const std::string& text) {
     return value;
 }
 
+/// How many characters of `text` parseReal() takes, or -1, where other text stands around it.
+ptrdiff_t parse(const std::string& text, double& value) {
+    const std::string padded = std::string(16, '9') + text + '\0' + std::string(16, '7');
+    const char* const begin = padded.data() + 16;
+    const char* const end = parseReal(begin, begin + text.size(), value);
+    return end ? end - begin : -1;
+}
+
 void expectExact(const std::string& text) {
     double value = 0;
-    const char* const end = parseReal(text.data(), text.data() + text.size(), value);
-    ASSERT_EQ(end, text.data() + text.size()) << text;
+    ASSERT_EQ(parse(text, value), ptrdiff_t(text.size())) << text;
     ASSERT_EQ(bitsOf(value), bitsOf(expected(text))) << text;
 }
 
@@ -76,7 +83,7 @@ TEST(NumberParser, takesWhatPrintfWrites) {
         }
         double back = 0;
         std::snprintf(text, sizeof text, "%.17g", value);
-        parseReal(text, text + std::strlen(text), back);
+        parse(text, back);
         ASSERT_EQ(bitsOf(back), bitsOf(value));
     }
 }
@@ -99,14 +106,26 @@ TEST(NumberParser, takesTheEnds) {
                           {"-0.0000", -0.0},
                           {"inf", infinity}}) {
         double value = 1;
-        const char* const end = c.text + std::strlen(c.text);
-        EXPECT_EQ(parseReal(c.text, end, value), end) << c.text;
+        EXPECT_EQ(parse(c.text, value), ptrdiff_t(std::strlen(c.text))) << c.text;
         EXPECT_EQ(bitsOf(value), bitsOf(c.value)) << c.text;
     }
-    for (const char* text : {"", "-", ".", "e5", "+-1", "abc"}) {
+    for (const char* text : {"", "-", ".", "-.", "--1", "e5", "+-1", "-+1", "/", "abc"}) {
         double value = 1;
-        EXPECT_EQ(parseReal(text, text + std::strlen(text), value), nullptr) << text;
+        EXPECT_EQ(parse(text, value), -1) << text;
     }
+}
+
+TEST(NumberParser, endsWhereTheNumberEnds) {
+    for (const std::string number : {"7", "-7", "0.25", "-.5", "5.", "123456.789e-3", "1e5",
+                                     "123456789012345", "0.12345678901234567"})
+        for (const std::string after :
+             {" ", "\n", "/", ".", "-", "-1", "..5", "e", "e+", "ex", "x"}) {
+            if (number.find_first_of(".e") == number.npos && after[0] == '.') continue;
+            if (number.find('e') != number.npos && after[0] == 'e') continue;
+            double value = 0;
+            EXPECT_EQ(parse(number + after, value), ptrdiff_t(number.size())) << number << after;
+            EXPECT_EQ(bitsOf(value), bitsOf(expected(number))) << number << after;
+        }
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ constexpr size_t kHeadBytes = 4096;
 std::string lowerCaseName(const std::string& path) {
     std::string name = path;
     for (char& c : name) c = char(std::tolower(static_cast<unsigned char>(c)));
-    for (const std::string packed : {".gz", ".xz", ".zst"})
+    for (const std::string_view packed : kPackedEndings)
         if (name.ends_with(packed)) name.resize(name.size() - packed.size());
     return name;
 }

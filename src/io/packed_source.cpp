@@ -181,6 +181,7 @@ public:
         const uint64_t ratio = packer_.largest_ratio;
         return file_.size() > UINT64_MAX / ratio ? UINT64_MAX : file_.size() * ratio;
     }
+    const std::string& tempDir() const override { return file_.tempDir(); }
     uint64_t storedBytes() const override { return file_.size(); }
     bool isCompressed() const override { return true; }
     void release() override {

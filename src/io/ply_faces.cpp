@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "io/notes.h"
 
 namespace pietra {
 
@@ -49,6 +50,7 @@ PlyFaceReader::PlyFaceReader(PlyCursor& cursor, const PlyElement& element, uint6
             fmt::format("the vertex indices of element {} are real numbers", element.name));
     list_property_ = size_t(list - properties.begin());
     bool colours = false;
+    std::vector<std::string> others;
     size_t lists = 0, bytes_after = 0;
     for (size_t i = 0; i < properties.size(); ++i) {
         const PlyProperty& p = properties[i];
@@ -60,9 +62,9 @@ PlyFaceReader::PlyFaceReader(PlyCursor& cursor, const PlyElement& element, uint6
         if (p.name == "red" || p.name == "green" || p.name == "blue" || p.name == "alpha")
             colours = true;
         else
-            schema_notes_.push_back(
-                fmt::format("property {} of element {} is left out", p.name, element.name));
+            others.push_back(p.name + " of element " + element.name);
     }
+    if (!others.empty()) schema_notes_.push_back(leftOut("property", others));
     if (colours) schema_notes_.push_back("colours of faces are left out");
 
     if (list->type == PlyType::kUint32) restart_ = int64_t(0xffffffff);

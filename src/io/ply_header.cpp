@@ -9,6 +9,7 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "io/file_signs.h"
+#include "io/notes.h"
 
 namespace pietra {
 
@@ -83,11 +84,8 @@ private:
     std::vector<std::string_view> words_;
 };
 
-/// A word as it may stand in a message: printable and short.
 std::string quoted(std::string_view word) {
-    std::string text = "\"";
-    for (const char c : word.substr(0, 40)) text += c >= 32 && c < 127 ? c : '?';
-    return text + (word.size() > 40 ? "...\"" : "\"");
+    return '"' + printable(word) + '"';
 }
 
 PlyType parseType(const HeaderLines& lines, std::string_view word) {
@@ -192,7 +190,11 @@ PlyHeader readPlyHeader(ByteReader& reader) {
         if (lines.words().empty()) continue;
         const std::string_view word = lines.words()[0];
         if (word == "end_header") break;
-        if (word == "comment" || word == "obj_info") continue;
+        if (word == "comment" || word == "obj_info") {
+            if (lines.words().size() > 2 && lines.words()[1] == "TextureFile")
+                header.names_textures = true;
+            continue;
+        }
         if (word == "format") {
             header.encoding = parseFormat(lines);
             has_format = true;

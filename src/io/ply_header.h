@@ -61,6 +61,7 @@ struct PlyHeader {
     std::vector<PlyElement> elements;  ///< in the order of the file
     uint64_t body_offset = 0;          ///< of the first byte after the header
     uint64_t body_line = 0;            ///< its line, from 1
+    bool names_textures = false;       ///< a comment does, as some programs have it
 
     const PlyElement* find(const std::string& name) const;
 };

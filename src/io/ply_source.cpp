@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "io/notes.h"
 #include "io/ply_cursor.h"
 #include "io/ply_faces.h"
 #include "io/ply_header.h"
@@ -135,6 +136,11 @@ std::vector<std::string> PlySource::notes() const {
         notes.insert(notes.end(), schema_notes.begin(), schema_notes.end());
         for (std::string& note : faces.notes()) notes.push_back(std::move(note));
     }
+    std::vector<std::string> others;
+    for (const PlyElement& e : header_.elements)
+        if (e.name != "vertex" && !holdsFaces(e) && e.count > 0) others.push_back(e.name);
+    if (!others.empty()) notes.push_back(leftOut("element", others));
+    if (header_.names_textures) notes.push_back("textures are left out");
     return notes;
 }
 

@@ -222,7 +222,10 @@ TEST(PlySource, keepsDoublesWhole) {
 std::string attributeMesh(PlyBuilder::Encoding encoding, bool vertex_list,
                           const std::string& colour_type) {
     PlyBuilder ply(encoding);
-    ply.line("obj_info anything").line("element camera 2").line("property float view_px");
+    ply.line("comment TextureFile a.png")
+        .line("obj_info anything")
+        .line("element camera 2")
+        .line("property float view_px");
     ply.line("property list uchar short crop").line("element vertex 4");
     ply.line("property double heat").line("property float x").line("property float y");
     if (vertex_list) ply.line("property list ushort float rest");
@@ -280,13 +283,30 @@ TEST(PlySource, carriesAttributesAndSkipsTheRest) {
                 EXPECT_EQ(mesh.triangles,
                           (std::vector<std::array<uint64_t, 3>>{{0, 1, 2}, {0, 1, 2}, {0, 2, 3}}));
                 std::vector<std::string> notes;
-                if (vertex_list) notes.push_back("the list rest of the vertices is left out");
-                notes.insert(notes.end(), {"texture coordinates are left out",
-                                           "property texcoord of element face is left out",
-                                           "colours of faces are left out",
-                                           "1 polygons are cut into fans of triangles"});
+                if (vertex_list) notes.push_back("property rest of element vertex is left out");
+                notes.insert(
+                    notes.end(),
+                    {"texture coordinates are left out",
+                     "property texcoord of element face is left out",
+                     "colours of faces are left out", "1 polygons are cut into fans of triangles",
+                     "elements camera and edge are left out", "textures are left out"});
                 EXPECT_EQ(mesh.notes, notes);
             }
+}
+
+TEST(PlySource, namesWhatIsLeftOutInFewWords) {
+    std::string head =
+        "ply\nformat ascii 1.0\nelement \x1b[31m 1\nproperty int a\nelement none 0\n";
+    for (int i = 0; i < 20; ++i) head += "element e" + std::to_string(i) + " 1\nproperty int a\n";
+    head +=
+        "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+    std::string rows;
+    for (int i = 0; i < 21; ++i) rows += "7\n";
+    const ScratchDirectory dir;
+    EXPECT_EQ(readWhole(dir.write("a.ply", head + rows + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")).notes,
+              (std::vector<std::string>{
+                  "elements ?[31m, e0, e1, e2, e3, e4, e5, e6, e7 and 12 others are left out"}));
 }
 
 TEST(PlySource, fansLongPolygonsAcrossBatches) {

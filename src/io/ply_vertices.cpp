@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "io/notes.h"
 
 namespace pietra {
 
@@ -156,11 +157,12 @@ void PlyVertexReader::chooseProperties() {
     for (const std::vector<size_t>& list : {position, normal, colour_})
         for (const size_t property : list) used[property] = true;
     bool texture = false;
+    std::vector<std::string> lists;
     for (size_t i = 0; i < element_.properties.size(); ++i) {
         const PlyProperty& p = element_.properties[i];
         if (used[i]) continue;
         if (p.is_list) {
-            notes_.push_back(fmt::format("the list {} of the vertices is left out", p.name));
+            lists.push_back(p.name + " of element " + element_.name);
         } else if (isTextureCoordinate(p.name)) {
             texture = true;
         } else {
@@ -168,6 +170,7 @@ void PlyVertexReader::chooseProperties() {
             schema_.scalars.push_back(p.name);
         }
     }
+    if (!lists.empty()) notes_.push_back(leftOut("property", lists));
     if (texture) notes_.push_back("texture coordinates are left out");
     schema_.normals_given = normal_.has_value();
     schema_.colours = !colour_.empty();

@@ -21,7 +21,6 @@ namespace pietra {
 struct StlPlace {
     uint64_t offset = 0;
     uint64_t facet = 0;     ///< how many facets lie before
-    uint64_t line = 1;      ///< text only
     bool in_solid = false;  ///< text only
 };
 

@@ -46,7 +46,7 @@ public:
 
 private:
     /// Few enough that a batch stays in the processor's cache while it is used.
-    static constexpr uint64_t kBatchFacets = 8192;
+    static constexpr uint64_t kBatchFacets = 2048;
     static_assert(3 * kBatchFacets <= kMaxBatch);
     /// About as many bytes as writers spend on a facet of a text.
     static constexpr uint64_t kUsualTextBytes = 260;

@@ -2,11 +2,14 @@
 
 #include "io/stl_source.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cctype>
 #include <cstring>
 #include <set>
+#include <sstream>
 
 #include "base/budget.h"
 #include "base/hash.h"
@@ -17,8 +20,6 @@
 namespace pietra {
 namespace {
 
-using Soup = std::vector<std::array<Vec3d, 3>>;
-
 /// Triangles whose corners depend on their number alone.
 Soup randomSoup(size_t triangles) {
     Soup soup(triangles);
@@ -27,14 +28,6 @@ Soup randomSoup(size_t triangles) {
         for (Vec3d& p : t)
             for (int k = 0; k < 3; ++k)
                 p[k] = double(float(int64_t(mixBits(++i)) >> 40) * 0x1p-20f);
-    return soup;
-}
-
-Soup soupOf(const WholeMesh& mesh) {
-    Soup soup;
-    for (const auto& t : mesh.triangles)
-        soup.push_back({mesh.vertices.position[t[0]], mesh.vertices.position[t[1]],
-                        mesh.vertices.position[t[2]]});
     return soup;
 }
 
@@ -115,6 +108,47 @@ TEST(StlSource, givesTheSameForEverySpelling) {
         EXPECT_EQ(soupOf(readWhole(dir.write("b.stl.gz", gzipped(text)))), soup);
     }
     EXPECT_EQ(soupOf(readWhole(dir.write("text.txt", textStl(soup, {.indent = ""})))), soup);
+}
+
+TEST(StlSource, facetsMayBeSpelledInTurns) {
+    // The reader knows facets and points again that are like others; these are, but not quite.
+    const std::string points[] = {" 1.2 3 4",
+                                  " 1.25 3 4",
+                                  " 1.2 3 4e0",
+                                  "\t1.2\t3 4",
+                                  " 1.2\n3 4 ",
+                                  " 1.20000000000 3.00000000 4",
+                                  " 1.20000000000 3.00000000 40",
+                                  " 1.20000000000 3.00000000 5",
+                                  "  1.20000000000000000000000000000000000000001 3 -0"};
+    const std::string ends[] = {"\nendloop\nendfacet\n", "\n\n endloop\r\nendfacet ",
+                                "\nENDLOOP\n endfacet\n"};
+    const std::string normals[] = {" 0 0 1", " 0  0 1", " nan 1e400 x", " 0\n0\n1"};
+    std::string text = "solid\n";
+    uint64_t state = 0;
+    const auto pick = [&](const auto& from) { return from[mixBits(++state) % std::size(from)]; };
+    Soup soup;
+    for (int i = 0; i < 5000; ++i) {
+        text += "facet normal" + pick(normals) + "\nouter loop";
+        soup.emplace_back();
+        for (Vec3d& corner : soup.back()) {
+            const std::string point = pick(points);
+            text += "\nvertex" + point;
+            std::istringstream(point) >> corner.x >> corner.y >> corner.z;
+        }
+        text += pick(ends);
+        if (i % 1000 == 999) text += "endsolid\nsolid again\n";
+    }
+    ScratchDirectory scratch;
+    EXPECT_EQ(soupOf(readWhole(scratch.write("a.stl", text + "endsolid"))), soup);
+    // Whatever lies before, a fault is found, on its line.
+    const std::string good = "solid\n" + std::string(3, '\n') + text.substr(6);
+    const auto lines = std::count(good.begin(), good.end(), '\n');
+    EXPECT_NE(
+        faultOf(scratch.write("b.stl", good + "facet normal 0 0 1\nouter loop\nvertex 1 2 nan")),
+        "");
+    EXPECT_NE(faultOf(scratch.file("b.stl")).find(fmt::format("line {}", lines + 3)),
+              std::string::npos);
 }
 
 TEST(StlSource, readsManyBatches) {

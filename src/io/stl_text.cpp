@@ -1,4 +1,4 @@
-// Text STL, word by word.
+// Text STL: word by word, but for the many facets that are spelled as the one before.
 
 #include <fmt/format.h>
 
@@ -11,6 +11,7 @@
 #include "io/file_signs.h"
 #include "io/number_parser.h"
 #include "io/stl_facets.h"
+#include "io/stl_shape.h"
 #include "io/text_window.h"
 
 namespace pietra {
@@ -26,17 +27,13 @@ bool isBlank(uint8_t c) {
     return c <= ' ';
 }
 
-/// Words of a text, one after the other, with the line that they stand on.
+/// Words of a text, one after the other.
 class WordReader : private TextWindow {
 public:
     explicit WordReader(ByteReader& reader) : TextWindow(reader) {}
 
-    void seek(const StlPlace& place) {
-        TextWindow::seek(place.offset);
-        line_ = place.line;
-    }
     using TextWindow::offset;
-    uint64_t line() const { return line_; }
+    using TextWindow::seek;
 
     /// The next word, or "" at the end of the file; good until the next call.
     std::string_view next() {
@@ -72,6 +69,29 @@ public:
         return value;
     }
 
+    /// A place in the text, to look back to.
+    struct Mark {
+        const char* p;
+        uint64_t offset;
+    };
+    Mark mark() {
+        need();
+        return {p_, offset()};
+    }
+    /// What `shape` is to learn lies between `mark` and here.
+    void teach(const Mark& mark, FacetShape& shape) const {
+        // Where the window has slid, the text is not there any more.
+        if (offset() - mark.offset == uint64_t(p_ - mark.p)) shape.learn(mark.p, p_);
+    }
+    /// Passes over a facet of that shape; false, and nothing done, where there is another or none.
+    bool take(FacetShape& shape, Vec3d* corners) {
+        need();
+        const char* const after = shape.take(p_, end_, corners);
+        if (!after || after - p_ >= ptrdiff_t(kMaxWord)) return false;
+        p_ = after;
+        return true;
+    }
+
     void skipLine() {
         for (;; ++p_) {
             need();
@@ -85,10 +105,17 @@ public:
                           [](char a, char b) { return lowerCase(a) == b; });
     }
 
-    [[noreturn]] void fail(const std::string& what) const {
-        throw InputError::atLine(reader_.path(), line_, what);
+    /// Says on which line, which nothing else needs to know.
+    [[noreturn]] void fail(const std::string& what) {
+        const uint64_t place = offset();
+        uint64_t line = 1;
+        seek(0);
+        for (char before = 0; offset() < place && p_ != end_; before = *p_++, need())
+            // A pair of both is one end of a line.
+            line += *p_ == '\r' || (*p_ == '\n' && before != '\r');
+        throw InputError::atLine(reader_.path(), line, what);
     }
-    [[noreturn]] void failWord(std::string_view word, const std::string& expected) const {
+    [[noreturn]] void failWord(std::string_view word, const std::string& expected) {
         if (word.empty()) fail(fmt::format("the file ends where {} is expected", expected));
         fail(fmt::format("\"{}\" stands where {} is expected", shownWord(word.data()), expected));
     }
@@ -101,13 +128,9 @@ private:
             const char c = *p_;
             if (!isBlank(uint8_t(c)) || p_ == end_) return p_;
             ++p_;
-            // A pair of both is one end of a line, which its second counts.
-            if (c == '\n' || (c == '\r' && *p_ != '\n')) ++line_;
             p_ += zerosBefore(loadEight(p_) ^ eightTimes(' '));
         }
     }
-
-    uint64_t line_ = 1;
 };
 
 class TextStl : public StlFacets {
@@ -118,14 +141,17 @@ public:
     std::optional<uint64_t> count() const override { return {}; }
 
     size_t read(StlPlace& place, std::span<Vec3d> corners) override {
-        words_.seek(place);
+        words_.seek(place.offset);
         size_t done = 0;
-        while (3 * done + 3 <= corners.size() && nextFacet(place)) {
-            readFacet(&corners[3 * done++]);
-            ++place.facet;
+        for (; 3 * done + 3 <= corners.size(); ++done, ++place.facet) {
+            Vec3d* const facet = &corners[3 * done];
+            if (place.in_solid && words_.take(shape_, facet)) continue;
+            const WordReader::Mark begin = words_.mark();
+            if (!nextFacet(place)) break;
+            readFacet(facet);
+            words_.teach(begin, shape_);
         }
         place.offset = words_.offset();
-        place.line = words_.line();
         return done;
     }
 
@@ -174,6 +200,7 @@ private:
     }
 
     WordReader words_;
+    FacetShape shape_;
 };
 
 }  // namespace

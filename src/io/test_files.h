@@ -1,5 +1,5 @@
 #pragma once
-// Helpers of the tests in src/io: scratch directories, whole meshes, the shared data.
+// Helpers of the tests in src/io: whole meshes, the shared data.
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -14,32 +14,10 @@
 
 #include "base/budget.h"
 #include "base/error.h"
+#include "base/scratch_directory.h"
 #include "io/triangle_source.h"
 
 namespace pietra {
-
-/// A directory that goes with the object.
-class ScratchDirectory {
-public:
-    ScratchDirectory() {
-        std::string name = (std::filesystem::temp_directory_path() / "pietra-test-XXXXXX").string();
-        if (!::mkdtemp(name.data())) throw std::runtime_error("mkdtemp");
-        path_ = name;
-    }
-    ~ScratchDirectory() { std::filesystem::remove_all(path_); }
-    std::string file(const std::string& name) const { return (path_ / name).string(); }
-    std::string path() const { return path_.string(); }
-    /// Writes `bytes` to a file and returns its path.
-    std::string write(const std::string& name, const std::string& bytes) const {
-        // note: truncating a file that exists makes some file systems write it out at once.
-        std::filesystem::remove(file(name));
-        std::ofstream(file(name), std::ios::binary) << bytes;
-        return file(name);
-    }
-
-private:
-    std::filesystem::path path_;
-};
 
 inline std::string readWholeFile(const std::string& path) {
     std::ostringstream text;
@@ -83,6 +61,17 @@ inline WholeMesh readWhole(TriangleSource& source) {
 
 inline WholeMesh readWhole(const std::string& path) {
     return readWhole(*openSource({path}));
+}
+
+/// The corners of triangles, which do not know of each other.
+using Soup = std::vector<std::array<Vec3d, 3>>;
+
+inline Soup soupOf(const WholeMesh& mesh) {
+    Soup soup;
+    for (const auto& t : mesh.triangles)
+        soup.push_back({mesh.vertices.position[t[0]], mesh.vertices.position[t[1]],
+                        mesh.vertices.position[t[2]]});
+    return soup;
 }
 
 inline void expectSameMesh(const WholeMesh& a, const WholeMesh& b) {

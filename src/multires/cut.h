@@ -50,6 +50,7 @@ struct Culling {
     bool cone = false;          ///< leave out closed parts that face away
     bool contribution = false;  ///< leave out what shows smaller than half the tolerance
     bool occlusion = false;     ///< leave out what is hidden: for renderers, no matter of cuts
+    bool operator==(const Culling&) const = default;
 };
 
 /// Nothing of the node nor of anything finer below it can be seen; judged by its saturated sphere,

@@ -12,6 +12,9 @@ namespace pietra {
 
 enum class StandardView { kFront, kBack, kLeft, kRight, kTop, kBottom, kIso };
 enum class UpAxis { kY, kZ };
+inline Vec3d upVector(UpAxis axis) {
+    return axis == UpAxis::kY ? Vec3d(0, 1, 0) : Vec3d(0, 0, 1);
+}
 
 /// "front", "back", "left", "right", "top", "bottom", "iso"; empty on anything else.
 std::optional<StandardView> parseStandardView(std::string_view name);

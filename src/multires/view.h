@@ -15,11 +15,13 @@ struct Camera {
     Vec3d target{0, 0, -1};
     Vec3d up{0, 1, 0};
     double fovy_deg = 45;
+    bool operator==(const Camera&) const = default;
 };
 
 struct PictureSize {
     int width = 1280;
     int height = 1024;
+    bool operator==(const PictureSize&) const = default;
 };
 
 /// The camera in lattice coordinates, ready for tests and for drawing.

@@ -4,12 +4,11 @@
 #include <zlib.h>
 
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <limits>
 
 #include "base/error.h"
+#include "base/scratch_directory.h"
 #include "render/shading.h"
 
 namespace pietra {
@@ -19,23 +18,17 @@ constexpr float kNothing = std::numeric_limits<float>::infinity();
 
 class PictureFile : public testing::Test {
 protected:
-    void SetUp() override {
-        std::string name = "/tmp/pietra_picture_XXXXXX";
-        ASSERT_NE(mkdtemp(name.data()), nullptr);
-        folder_ = name;
-    }
-    void TearDown() override { std::filesystem::remove_all(folder_); }
-    std::string path(const std::string& name) const { return (folder_ / name).string(); }
+    std::string path(const std::string& name) const { return scratch_.file(name); }
     std::string bytes(const std::string& name) const {
         std::ifstream in(path(name), std::ios::binary);
         return {std::istreambuf_iterator<char>(in), {}};
     }
     void put(const std::string& name, const std::string& bytes) const {
-        std::ofstream(path(name), std::ios::binary) << bytes;
+        scratch_.write(name, bytes);
     }
 
 private:
-    std::filesystem::path folder_;
+    const ScratchDirectory scratch_;
 };
 
 Picture sample(int width, int height) {

@@ -57,10 +57,13 @@ inline constexpr float kEyeLight = 0.07f;
 inline constexpr float kShine = 0.12f;
 
 /// Show::kWire: what a base colour is multiplied by, so far (in pixels) from the nearest edge of a
-/// triangle whose least height is `height`: triangles too small for lines have none.
+/// triangle whose least height is `height`: lines fade where triangles get too small for them.
+inline constexpr float kWireReach = 1.25f, kWireDarkness = 0.8f;
+inline constexpr float kWireLeastHeight = 2, kWireFade = 6;
 inline float wireShade(float distance, float height) {
-    const float line = std::clamp(1.25f - distance, 0.0f, 1.0f);
-    return 1 - 0.8f * line * std::clamp((height - 2) / 6, 0.0f, 1.0f);
+    const float line = std::clamp(kWireReach - distance, 0.0f, 1.0f);
+    const float visible = std::clamp((height - kWireLeastHeight) / kWireFade, 0.0f, 1.0f);
+    return 1 - kWireDarkness * line * visible;
 }
 
 /// Linear light of an sRGB value in [0, 1], which is clamped, or of a byte; the byte nearest to a

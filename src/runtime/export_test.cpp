@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <mutex>
@@ -10,6 +9,7 @@
 
 #include "base/check.h"
 #include "base/error.h"
+#include "base/scratch_directory.h"
 #include "runtime/export_cut.h"
 #include "runtime/patch_reader.h"
 #include "store/model_writer.h"
@@ -49,18 +49,12 @@ Mesh sheetPatch(int px, int py) {
 /// A model of one level, several patches a page.
 class ExportTest : public ::testing::Test {
 protected:
-    ExportTest() {
-        std::string pattern = (fs::temp_directory_path() / "pietra-export-XXXXXX").string();
-        if (::mkdtemp(pattern.data()) == nullptr) std::abort();
-        directory_ = pattern;
-        writeModel();
-    }
-    ~ExportTest() override { fs::remove_all(directory_); }
-    std::string pathTo(const std::string& name) const { return directory_ + "/" + name; }
+    ExportTest() { writeModel(); }
+    std::string pathTo(const std::string& name) const { return scratch_.file(name); }
 
     void writeModel() {
         Budget budget(size_t(64) << 20);
-        ModelWriter writer(pathTo("sheet.pietra"), false, directory_, budget);
+        ModelWriter writer(pathTo("sheet.pietra"), false, scratch_.path(), budget);
         writer.beginLevel(0);
         const PageSettings settings{.scalar_count = 1, .normal_bits = 16};
         for (int py = 0; py < kPatches; ++py) {
@@ -88,7 +82,7 @@ protected:
     }
 
 private:
-    std::string directory_;
+    const ScratchDirectory scratch_;
 };
 
 /// Keeps what it is given.

@@ -24,7 +24,7 @@ void ForestRefiner::select(const View& view, double pixels, const Culling& culli
     ++round_;
     for (const NodeIndex root : forest_.roots()) page_used_[forest_.node(root).page] = selects_;
     visit(
-        view, pixels, culling,
+        view, pixels, culling, Missed::kAll,
         [&](NodeIndex i, double error) {
             selection.draw.push_back(i);
             selection.triangles += forest_.node(i).triangles;
@@ -39,7 +39,7 @@ void ForestRefiner::select(const View& view, double pixels, const Culling& culli
 void ForestRefiner::prefetch(const View& view, double pixels, const Culling& culling,
                              std::vector<PageRequest>& requests) {
     visit(
-        view, pixels, culling, [](NodeIndex, double) {}, [](uint32_t) {});
+        view, pixels, culling, Missed::kFirst, [](NodeIndex, double) {}, [](uint32_t) {});
     requestMissing(requests);
 }
 

@@ -34,7 +34,8 @@ public:
     /// shows at most `pixels` of error, or waits for the pages requested. Linear in the groups
     /// visited.
     void select(const View& view, double pixels, const Culling& culling, Selection& selection);
-    /// Appends what another view would request and select() has not: after it, in the same frame.
+    /// Appends what another view would request first and select() has not: after it, in the same
+    /// frame. Of what is below that nothing yet, so that this takes no longer than select().
     void prefetch(const View& view, double pixels, const Culling& culling,
                   std::vector<PageRequest>& requests);
 
@@ -42,7 +43,8 @@ public:
     template <class Visit>
     void visitDrawable(const View& view, double pixels, const Visit& visit_node) {
         visit(
-            view, pixels, {}, [&](NodeIndex i, double) { visit_node(i); }, [](uint32_t) {});
+            view, pixels, {}, Missed::kFirst, [&](NodeIndex i, double) { visit_node(i); },
+            [](uint32_t) {});
     }
 
     /// The last select() could not have drawn what it did without this page.
@@ -55,9 +57,12 @@ private:
         float pixels;
     };
 
+    /// Of what is missing: all levels of it, or the first one.
+    enum class Missed { kAll, kFirst };
+
     template <class Draw, class Refined>
-    void visit(const View& view, double pixels, const Culling& culling, const Draw& draw,
-               const Refined& refined);
+    void visit(const View& view, double pixels, const Culling& culling, Missed missed,
+               const Draw& draw, const Refined& refined);
     void requestMissing(std::vector<PageRequest>& requests);
     void use(uint32_t group);
     void request(uint32_t group, float pixels, std::vector<PageRequest>& requests);
@@ -77,11 +82,11 @@ private:
 };
 
 /// Top-down over what may be visible: draw(node, pixels of error), refined(group) for those that
-/// are refined. Those that should be go to `missing_`, and likewise what should be below them, so
-/// that all levels that are missing are asked for at once.
+/// are refined. Those that should be go to `missing_`, and likewise what should be below them, if
+/// all levels that are missing are to be asked for at once.
 template <class Draw, class Refined>
-void ForestRefiner::visit(const View& view, double pixels, const Culling& culling, const Draw& draw,
-                          const Refined& refined) {
+void ForestRefiner::visit(const View& view, double pixels, const Culling& culling, Missed missed,
+                          const Draw& draw, const Refined& refined) {
     missing_.clear();
     stack_.clear();
     for (const NodeIndex root : forest_.roots()) stack_.push_back({root, false});
@@ -96,7 +101,7 @@ void ForestRefiner::visit(const View& view, double pixels, const Culling& cullin
         if (open) refined(forest_.groupOf(i));
         if (refine && !open) missing_.push_back({forest_.groupOf(i), float(error)});
         if (!open && !covered && !patchInvisible(node, view, pixels, culling)) draw(i, error);
-        if (!refine) continue;
+        if (!refine || (!open && missed == Missed::kFirst)) continue;
         for (const NodeIndex child : node.child)
             if (child != kNoNode) stack_.push_back({child, !open});
     }

@@ -9,7 +9,7 @@ namespace pietra {
 namespace {
 
 /// Where all cores are busy, drawing goes before loading, but does not starve it.
-constexpr int kNiceness = 5;
+constexpr int kNiceness = 10;
 
 }  // namespace
 

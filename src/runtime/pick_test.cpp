@@ -2,17 +2,15 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <random>
 
+#include "base/scratch_directory.h"
 #include "multires/cut.h"
 #include "runtime/patch_reader.h"
 #include "store/terrain_model.h"
 
 namespace pietra {
 namespace {
-
-namespace fs = std::filesystem;
 
 /// By the other way: the height of the finest surface over a point, from its plane.
 double heightAt(const ModelReader& model, const Vec2d& at) {
@@ -35,16 +33,16 @@ double heightAt(const ModelReader& model, const Vec2d& at) {
 
 class PickTest : public ::testing::Test {
 protected:
-    PickTest() : path_(fs::temp_directory_path() / ("pick-" + std::to_string(::getpid()))) {
+    PickTest() {
         ToyTerrainSettings settings;
         settings.depth = 8;
-        writeTerrainModel(makeToyTerrain(settings), path_, fs::temp_directory_path(), {0, 0, 0});
+        writeTerrainModel(makeToyTerrain(settings), path_, scratch_.path(), {0, 0, 0});
         model_.emplace(path_);
     }
-    ~PickTest() override { fs::remove(path_); }
     const Lattice& lattice() const { return model_->info().lattice; }
 
-    std::string path_;
+    const ScratchDirectory scratch_;
+    const std::string path_ = scratch_.file("model");
     std::optional<ModelReader> model_;
 };
 

@@ -8,24 +8,17 @@
 
 #include "base/error.h"
 #include "base/progress.h"
+#include "base/stopwatch.h"
 #include "runtime/page_pool.h"
+#include "runtime/scene_tolerance.h"
 
 namespace pietra {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 /// How far ahead the camera is predicted, seconds, and the share of the tolerance that prefetching
 /// goes to where it stands.
 constexpr double kLookahead = 0.5, kNextLevel = 0.5;
-/// Of the budget: below this the tolerance comes down again.
-constexpr double kComfortable = 0.8;
-/// By which the tolerance goes up in a frame that lacks memory, and down in one that has it.
-constexpr double kRaise = 1.1, kLower = 0.99, kMostRaised = 1 << 20;
-
-double msSince(Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
+constexpr uint32_t kPrefetchFrames = 4;
 
 }  // namespace
 
@@ -40,11 +33,11 @@ public:
         : models_(makeModels(readers)),
           table_bytes_(tablesOf(readers)),
           pages_(models_, settings.ram_bytes, table_bytes_, settings.loader_threads,
-                 settings.sink) {}
+                 settings.sink) {
+        last_.seconds = -std::numeric_limits<double>::infinity();
+    }
 
     const Frame& update(const FrameRequest& request);
-    bool idle() const { return !pages_.blocked() && pages_.missing() == 0; }
-    bool stuck() const { return pages_.blocked() && tolerance_factor_ >= kMostRaised; }
     const std::vector<std::string>& faults() const { return pages_.faults(); }
 
 private:
@@ -58,7 +51,8 @@ private:
     void select(const FrameRequest& request);
     void wantMissing();
     void prefetch(const FrameRequest& request);
-    void adaptTolerance();
+    Camera cameraAhead(const FrameRequest& request) const;
+    std::vector<PageKey> pagesFor(const Camera& camera, const FrameRequest& request, double share);
     bool mayBeInside(uint32_t m, const View& view);
     void describe(const SceneModel& model, uint32_t m, bool show_error, ModelFrame& out) const;
 
@@ -67,13 +61,15 @@ private:
     PagePool pages_;
     std::vector<Missing> missing_;
     std::vector<PageKey> missing_for_eye_;
-    size_t used_bytes_ = 0;  // of the pages that this frame needs and has
-    double tolerance_factor_ = 1;
+    std::vector<NodeIndex> cut_for_eye_;    // what tells where the eye is
+    std::vector<PageIndex> pages_for_eye_;  // that hold it
+    size_t used_bytes_ = 0;                 // of the pages that this frame needs and has
+    SceneTolerance tolerance_;
     uint32_t frame_number_ = PageMemory::kFramesKept;
-    Camera last_camera_;
-    double last_seconds_ = -std::numeric_limits<double>::infinity();
+    FrameRequest last_;
     Frame frame_;
-    Selection scratch_;
+    std::vector<PageKey> ahead_, next_level_;  // to be prefetched
+    std::vector<PageRequest> requests_;        // scratch
 };
 
 size_t Scene::Impl::tablesOf(const std::vector<const ModelReader*>& readers) {
@@ -90,28 +86,33 @@ SceneModels Scene::Impl::makeModels(const std::vector<const ModelReader*>& reade
 }
 
 const Frame& Scene::Impl::update(const FrameRequest& request) {
-    const auto start = Clock::now();
+    const Stopwatch watch;
     pages_.publish(++frame_number_);
-    frame_.publish_ms = msSince(start);
+    frame_.publish_ms = watch.ms();
     select(request);
     wantMissing();
     if (request.prefetch) prefetch(request);
     pages_.load();
-    frame_.converged = pages_.missing() == 0 && tolerance_factor_ == 1;
-    adaptTolerance();
-    last_camera_ = request.camera;
-    last_seconds_ = request.seconds;
+    frame_.raised = tolerance_.factor() > 1;
+    frame_.converged = pages_.missing() == 0 && !frame_.raised;
+    tolerance_.adapt({.same_request = last_.sameView(request),
+                      .blocked = pages_.blocked(),
+                      .missing = pages_.missing(),
+                      .used = used_bytes_,
+                      .budget = pages_.drawn().budget});
+    frame_.settled = tolerance_.settled();
+    last_ = request;
     frame_.resident_bytes = pages_.ramBytes() + table_bytes_;
     frame_.device_bytes = pages_.deviceBytes();
     frame_.bytes_read = pages_.bytesRead();
-    frame_.select_ms = msSince(start) - frame_.publish_ms;
+    frame_.select_ms = watch.ms() - frame_.publish_ms;
     return frame_;
 }
 
 void Scene::Impl::select(const FrameRequest& request) {
     missing_.clear();
     missing_for_eye_.clear();
-    const double pixels = request.pixels * tolerance_factor_;
+    const double pixels = request.pixels * tolerance_.factor();
     frame_.tolerance_px = request.pixels;
     frame_.triangles = frame_.patch_count = used_bytes_ = 0;
     for (uint32_t m = 0; m < models_.size(); ++m) {
@@ -146,34 +147,42 @@ void Scene::Impl::wantMissing() {
     for (const PageKey& key : missing_for_eye_) pages_.want(key, Need::kEye);
 }
 
-/// For where the camera will be in half a second, and for the next level where it is.
+/// For where the camera will be in half a second, and for the next level where it is: these change
+/// little from frame to frame, so that each is looked up anew in one frame of kPrefetchFrames.
 void Scene::Impl::prefetch(const FrameRequest& request) {
-    const double dt = request.seconds - last_seconds_;
+    const uint32_t turn = frame_number_ % kPrefetchFrames;
+    if (turn == 0) ahead_ = pagesFor(cameraAhead(request), request, 1);
+    if (turn == kPrefetchFrames / 2) next_level_ = pagesFor(request.camera, request, kNextLevel);
+    for (const auto* pages : {&ahead_, &next_level_})
+        for (const PageKey& key : *pages)
+            if (!models_[key.model]->residency.resident(key.page)) pages_.want(key, Need::kLater);
+}
+
+Camera Scene::Impl::cameraAhead(const FrameRequest& request) const {
+    const double dt = request.seconds - last_.seconds;
     Camera ahead = request.camera;
     if (dt > 0 && dt < kLookahead) {
         const double steps = kLookahead / dt;
-        ahead.eye += (request.camera.eye - last_camera_.eye) * steps;
-        ahead.target += (request.camera.target - last_camera_.target) * steps;
+        ahead.eye += (request.camera.eye - last_.camera.eye) * steps;
+        ahead.target += (request.camera.target - last_.camera.target) * steps;
         if (ahead.eye == ahead.target) ahead = request.camera;
     }
-    const double pixels = request.pixels * tolerance_factor_;
-    for (uint32_t m = 0; m < models_.size(); ++m) {
-        SceneModel& model = *models_[m];
-        scratch_.requests.clear();
-        model.refiner.prefetch(View(ahead, request.size, model.reader.info().lattice), pixels,
-                               request.culling, scratch_.requests);
-        model.refiner.prefetch(frame_.models[m].view, pixels * kNextLevel, request.culling,
-                               scratch_.requests);
-        for (const PageRequest& r : scratch_.requests) pages_.want({m, r.page}, Need::kLater);
-    }
+    return ahead;
 }
 
-void Scene::Impl::adaptTolerance() {
-    if (pages_.blocked())
-        tolerance_factor_ = std::min(tolerance_factor_ * kRaise, kMostRaised);
-    else if (pages_.missing() == 0 &&
-             double(used_bytes_) < kComfortable * double(pages_.drawn().budget))
-        tolerance_factor_ = std::max(1.0, tolerance_factor_ * kLower);
+/// That a frame from there would lack, and this one does not.
+std::vector<PageKey> Scene::Impl::pagesFor(const Camera& camera, const FrameRequest& request,
+                                           double share) {
+    std::vector<PageKey> pages;
+    for (uint32_t m = 0; m < models_.size(); ++m) {
+        SceneModel& model = *models_[m];
+        requests_.clear();
+        model.refiner.prefetch(View(camera, request.size, model.reader.info().lattice),
+                               request.pixels * tolerance_.factor() * share, request.culling,
+                               requests_);
+        for (const PageRequest& r : requests_) pages.push_back({m, r.page});
+    }
+    return pages;
 }
 
 /// Whatever is not known counts as inside.
@@ -184,27 +193,27 @@ bool Scene::Impl::mayBeInside(uint32_t m, const View& view) {
     const uint64_t departures = model.residency.departures();
     if (model.side && departures == model.side_departures && model.side->decides(view.eye()))
         return model.side->mayBeInside();
-    EyeSide side(view.eye());
-    bool known = true;
-    size_t bytes = 0;
-    const size_t missing_before = missing_for_eye_.size();
-    model.refiner.visitDrawable(view, kEyeSidePixels, [&](NodeIndex i) {
-        const Node& node = model.forest.node(i);
-        if (std::exchange(model.eye_used[node.page], frame_number_) != frame_number_)
-            bytes += model.copy_bytes[node.page];
-        if (const Mesh* mesh = model.mesh(i))
-            side.add(node, *mesh);
-        else
-            missing_for_eye_.push_back({m, node.page});
-        known &= model.hasCopy(node.page);
-    });
     model.side.reset();
-    if (!pages_.mayStay(bytes)) {
-        missing_for_eye_.resize(missing_before);
-        for (uint32_t& frame : model.eye_used) frame = 0;
-        return true;
+    cut_for_eye_.clear();
+    pages_for_eye_.clear();
+    model.refiner.visitDrawable(view, kEyeSidePixels, [&](NodeIndex i) {
+        cut_for_eye_.push_back(i);
+        pages_for_eye_.push_back(model.forest.node(i).page);
+    });
+    std::sort(pages_for_eye_.begin(), pages_for_eye_.end());
+    pages_for_eye_.erase(std::unique(pages_for_eye_.begin(), pages_for_eye_.end()),
+                         pages_for_eye_.end());
+    size_t bytes = 0;
+    for (const PageIndex page : pages_for_eye_) bytes += model.copy_bytes[page];
+    if (!pages_.mayStay(bytes)) return true;
+    const size_t missing_before = missing_for_eye_.size();
+    for (const PageIndex page : pages_for_eye_) {
+        model.eye_used[page] = frame_number_;
+        if (!model.hasCopy(page)) missing_for_eye_.push_back({m, page});
     }
-    if (!known) return true;
+    if (missing_for_eye_.size() > missing_before) return true;
+    EyeSide side(view.eye());
+    for (const NodeIndex i : cut_for_eye_) side.add(model.forest.node(i), *model.mesh(i));
     model.side = side;
     model.side_departures = departures;
     return side.mayBeInside();
@@ -240,8 +249,8 @@ const Frame& Scene::converge(const FrameRequest& request) {
     for (;;) {
         if (Progress::cancelRequested()) throw Interrupted();
         const Frame& frame = impl_->update(request);
-        if (impl_->idle() || impl_->stuck()) return frame;
-        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        if (frame.settled) return frame;
+        std::this_thread::sleep_for(std::chrono::microseconds(200));
     }
 }
 

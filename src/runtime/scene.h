@@ -42,6 +42,12 @@ struct FrameRequest {
     Culling culling{true, true, true, true};
     bool prefetch = true;
     bool show_error = false;  ///< DrawPatch::value is the error in pixels, not the level
+
+    /// Asks for the same cut.
+    bool sameView(const FrameRequest& other) const {
+        return camera == other.camera && size == other.size && pixels == other.pixels &&
+               culling == other.culling;
+    }
 };
 
 /// What is drawn of a model.
@@ -59,6 +65,9 @@ struct Frame {
     /// fit. Infinite where the eye is inside a sphere that could not be refined.
     double tolerance_px = 0;
     bool converged = false;  ///< nothing is missing, at the tolerance asked for
+    bool raised = false;     ///< the tolerance, as memory is too small for the one asked for
+    bool settled = false;    ///< nothing is missing, at a tolerance that memory allows: as long as
+                             ///< the view stays, so does what is drawn
     uint64_t triangles = 0, patch_count = 0;
     size_t resident_bytes = 0;  ///< in RAM, tables included
     size_t device_bytes = 0;    ///< in the sink
@@ -75,8 +84,8 @@ public:
 
     /// Valid until the next call.
     const Frame& update(const FrameRequest& request);
-    /// Waits until everything that `request` asks for is there or is known not to fit. For
-    /// screenshots and measurements. Throws Interrupted where that was asked for.
+    /// Waits until the frame is settled. For screenshots and measurements. Throws Interrupted where
+    /// that was asked for.
     const Frame& converge(const FrameRequest& request);
 
     /// Pages that cannot be read: a sentence each. What they hold is drawn coarser.

@@ -30,7 +30,7 @@ public:
         Vec3d facing(0, 0, 0);
         for (const Surface::Point& p : surface.points) facing += p.normal;
         facing /= double(surface.points.size());
-        up_ = up == UpAxis::kY ? Vec3d(0, 1, 0) : Vec3d(0, 0, 1);
+        up_ = upVector(up);
         if (glm::length(facing) > kFacesOneWay) up_ = glm::normalize(facing);
         along_ = Vec3d(1, 0, 0) - up_ * up_.x;
         if (glm::length(along_) < 0.5) along_ = Vec3d(0, 1, 0) - up_ * up_.y;

@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -14,6 +13,7 @@
 #include "base/error.h"
 #include "base/hash.h"
 #include "base/parallel.h"
+#include "base/scratch_directory.h"
 #include "store/model_reader.h"
 #include "store/model_writer.h"
 #include "store/node_block.h"
@@ -30,14 +30,8 @@ using Bytes = std::vector<std::byte>;
 /// A directory of its own for each test, removed afterwards.
 class ModelTest : public ::testing::Test {
 protected:
-    ModelTest() {
-        std::string pattern = (fs::temp_directory_path() / "pietra-store-XXXXXX").string();
-        if (::mkdtemp(pattern.data()) == nullptr) std::abort();
-        directory_ = pattern;
-    }
-    ~ModelTest() override { fs::remove_all(directory_); }
-    std::string pathTo(const std::string& name) const { return (directory_ / name).string(); }
-    std::string directory() const { return directory_.string(); }
+    std::string pathTo(const std::string& name) const { return scratch_.file(name); }
+    std::string directory() const { return scratch_.path(); }
 
     static Bytes load(const std::string& path) {
         Bytes bytes(fs::file_size(path));
@@ -51,7 +45,7 @@ protected:
     }
 
 private:
-    fs::path directory_;
+    const ScratchDirectory scratch_;
 };
 
 /// A model to be written: a binary tree of small sheets, four nodes a page, groups of two.
@@ -60,6 +54,7 @@ struct Plan {
     AttributeSchema schema;
     int columns = 5;
     std::function<void(Node&, uint32_t index)> change;  ///< spoils nodes before they are written
+    std::function<void(Mesh&, uint32_t index)> change_patch;
 };
 
 Sphere enclosing(const Mesh& mesh) {
@@ -118,6 +113,7 @@ void writeModel(const std::string& path, const std::string& temp_dir, const Plan
             for (uint32_t i = first; i < std::min(first + 4, count); ++i) {
                 meshes.push_back(
                     makeSheet(plan.columns, 3 + int(i % 5), settingsOf(plan.schema), random));
+                if (plan.change_patch) plan.change_patch(meshes.back(), global + i);
                 nodes.push_back(describe(meshes.back(), level, i, plan.levels));
                 if (level + 1 < plan.levels) {
                     nodes.back().child[0] = 2 * i;
@@ -500,6 +496,22 @@ TEST_F(ModelTest, verifyFindsWhatIsWrongWithNodes) {
         ASSERT_FALSE(report.faults.empty()) << c.text;
         EXPECT_EQ(report.faults[0], pathTo("a.pietra") + ": " + c.text);
     }
+}
+
+TEST_F(ModelTest, verifyFindsWhatIsFalselyCalledClosed) {
+    const auto faultsWith = [&](const std::function<void(Mesh&)>& spoil) {
+        Plan plan;
+        plan.change = [](Node& n, uint32_t i) { n.closed = i == 6; };
+        plan.change_patch = [&](Mesh& mesh, uint32_t i) {
+            if (i == 6) spoil(mesh);
+        };
+        writeModel(pathTo("a.pietra"), directory(), plan, true);
+        return verify(pathTo("a.pietra")).cones.bad;
+    };
+    EXPECT_EQ(faultsWith([](Mesh&) {}), 0u);
+    EXPECT_EQ(faultsWith([](Mesh& mesh) { mesh.edge_class[2] = uint8_t(EdgeClass::kBorder); }), 1u);
+    EXPECT_EQ(faultsWith([](Mesh& mesh) { std::swap(mesh.triangle[3][0], mesh.triangle[3][1]); }),
+              1u);
 }
 
 TEST_F(ModelTest, verifyCountsAreTheSameForAnyNumberOfThreads) {

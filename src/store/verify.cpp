@@ -47,6 +47,19 @@ bool holds(const NormalCone& cone, const Mesh& patch) {
     return true;
 }
 
+/// Every edge is an ordinary one, and no two triangles run along one in the same direction.
+bool mayBeClosed(const Mesh& patch) {
+    if (std::any_of(patch.edge_class.begin(), patch.edge_class.end(),
+                    [](uint8_t classes) { return classes != 0; }))
+        return false;
+    std::vector<uint64_t> directed;
+    directed.reserve(3 * patch.triangleCount());
+    for (const Triangle& t : patch.triangle)
+        for (size_t k = 0; k < 3; ++k) directed.push_back(uint64_t(t[k]) << 32 | t[(k + 1) % 3]);
+    std::sort(directed.begin(), directed.end());
+    return std::adjacent_find(directed.begin(), directed.end()) == directed.end();
+}
+
 bool sameRefinement(const Node& a, const Node& b) {
     return a.error == b.error && a.saturated.centre == b.saturated.centre &&
            a.saturated.radius == b.saturated.radius;
@@ -61,9 +74,10 @@ enum Finding : uint8_t {
     kErrorBelowChild = 16,
     kGroupDiffers = 32,
     kConeTooNarrow = 64,
+    kFalselyClosed = 128,
 };
 
-constexpr std::array<std::pair<Finding, const char*>, 7> kFindingTexts = {{
+constexpr std::array<std::pair<Finding, const char*>, 8> kFindingTexts = {{
     {kBadParents, "is not the child of exactly one node of the level above"},
     {kPatchOutside, "has vertices outside of its bounds"},
     {kBoundsOutside, "has bounds that stick out of its saturated sphere"},
@@ -71,6 +85,7 @@ constexpr std::array<std::pair<Finding, const char*>, 7> kFindingTexts = {{
     {kErrorBelowChild, "has an error below that of a child"},
     {kGroupDiffers, "differs in error or saturated sphere from others of its group"},
     {kConeTooNarrow, "has triangles whose normals lie outside of its cone"},
+    {kFalselyClosed, "says that it is closed, but has a border, a fold or a triangle turned over"},
 }};
 
 void checkForest(std::span<const Node> nodes, std::vector<uint8_t>& found) {
@@ -123,6 +138,7 @@ std::string checkPage(const ModelReader& model, uint32_t page, std::vector<std::
         for (const Vec3i& p : patches[i].position)
             if (!holds(node.bounds, p)) found[index] |= kPatchOutside;
         if (!holds(node.cone, patches[i])) found[index] |= kConeTooNarrow;
+        if (node.closed && !mayBeClosed(patches[i])) found[index] |= kFalselyClosed;
     }
     return {};
 }
@@ -145,7 +161,7 @@ void countFindings(const ModelReader& model, const std::vector<std::string>& pag
         report.bounds.not_nested +=
             (found[i] & (kPatchOutside | kBoundsOutside | kChildOutside)) != 0;
         report.errors.not_monotone += (found[i] & (kErrorBelowChild | kGroupDiffers)) != 0;
-        report.cones.bad += (found[i] & kConeTooNarrow) != 0;
+        report.cones.bad += (found[i] & (kConeTooNarrow | kFalselyClosed)) != 0;
     }
 }
 

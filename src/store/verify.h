@@ -1,7 +1,8 @@
 #pragma once
 // What `check` finds out from a model file alone, whatever its method: every page matches its
 // checksum and decodes, every node's children form a forest, bounds are nested, errors monotone and
-// equal within a group, and cones hold the normals of their triangles.
+// equal within a group, cones hold the normals of their triangles, and what says that it is closed
+// may be so.
 //
 // Streams: pages are read and decoded in parallel, one at a time a thread; beside the reader's node
 // table it takes some twelve bytes a node. The result does not depend on the number of threads.
@@ -36,7 +37,7 @@ struct VerifyReport {
     } errors;
     struct {
         uint64_t checked = 0;  ///< nodes
-        uint64_t bad = 0;      ///< some triangle's normal is outside
+        uint64_t bad = 0;      ///< some triangle's normal is outside, or falsely called closed
     } cones;
     /// One sentence each with the file's name and, for pages, the byte offset; the first
     /// kMaxFaultTexts in the order of nodes.

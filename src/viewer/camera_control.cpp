@@ -22,7 +22,7 @@ double pixelsPerUnit(const Camera& camera, const PictureSize& size) {
 }  // namespace
 
 CameraControl::CameraControl(const Box3d& bounds, UpAxis up, const Camera& start)
-    : bounds_(bounds), up_(up == UpAxis::kY ? Vec3d(0, 1, 0) : Vec3d(0, 0, 1)), camera_(start) {}
+    : bounds_(bounds), up_(upVector(up)), camera_(start) {}
 
 CameraControl::Axes CameraControl::axes() const {
     const Vec3d forward = glm::normalize(camera_.target - camera_.eye);

@@ -71,8 +71,7 @@ void OpenFiles::acceptOffers() {
     for (const std::string& mesh : std::exchange(offers_, {})) build(mesh);
 }
 
-bool OpenFiles::poll() {
-    const size_t before = models_.size();
+void OpenFiles::poll() {
     std::erase_if(builds_, [&](const std::unique_ptr<BackgroundBuild>& build) {
         const BackgroundBuild::State state = build->poll();
         if (state == BackgroundBuild::State::kRunning) return false;
@@ -86,7 +85,6 @@ bool OpenFiles::poll() {
         }
         return true;
     });
-    return models_.size() > before;
 }
 
 void OpenFiles::stopBuild(const BackgroundBuild* build) {

@@ -23,8 +23,8 @@ public:
     /// Builds what is offered, or forgets it.
     void acceptOffers();
     void refuseOffers() { offers_.clear(); }
-    /// Opens what has been built. True if there are more models than before.
-    bool poll();
+    /// Opens what has been built.
+    void poll();
 
     std::vector<const ModelReader*> models() const;
     /// Closes all models but the first `count`, saying why.

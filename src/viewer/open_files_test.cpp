@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "base/error.h"
+#include "base/scratch_directory.h"
 
 namespace pietra {
 namespace {
@@ -17,20 +18,12 @@ namespace fs = std::filesystem;
 
 class OpenFilesTest : public testing::Test {
 protected:
-    OpenFilesTest()
-        : folder_(fs::temp_directory_path() / ("open_files_" + std::to_string(::getpid()))) {
-        fs::create_directories(folder_);
-        write("mesh.ply", "a mesh");
-    }
-    ~OpenFilesTest() override { fs::remove_all(folder_); }
+    OpenFilesTest() { scratch_.write("mesh.ply", "a mesh"); }
 
-    std::string path(const std::string& name) const { return folder_ / name; }
-    void write(const std::string& name, const std::string& text) {
-        std::ofstream(path(name)) << text;
-    }
+    std::string path(const std::string& name) const { return scratch_.file(name); }
     /// A program that does as the script says when asked to build.
     std::string program(const std::string& script) {
-        write("program", "#!/bin/sh\n" + script);
+        scratch_.write("program", "#!/bin/sh\n" + script);
         ::chmod(path("program").c_str(), 0755);
         return path("program");
     }
@@ -42,7 +35,7 @@ protected:
         }
     }
 
-    fs::path folder_;
+    const ScratchDirectory scratch_;
 };
 
 TEST_F(OpenFilesTest, aMeshIsOfferedAndBuiltWhenAccepted) {
@@ -76,14 +69,14 @@ TEST_F(OpenFilesTest, progressIsTold) {
 TEST_F(OpenFilesTest, whatCannotBeOpenedThrows) {
     OpenFiles files("/nowhere");
     EXPECT_THROW(files.open(path("none.ply"), true), IoError);
-    EXPECT_THROW(files.open(folder_, true), IoError);
+    EXPECT_THROW(files.open(scratch_.path(), true), IoError);
     EXPECT_THROW(files.open(path("mesh.ply"), true), IoError);
 }
 
 TEST_F(OpenFilesTest, modelsLieBesideTheirMeshesOrInTheCache) {
     EXPECT_EQ(modelPathOf(path("scan.ply.gz")), path("scan.pietra"));
     EXPECT_EQ(modelPathOf(path("v1.2.obj")), path("v1.2.pietra"));
-    ::setenv("XDG_CACHE_HOME", folder_.c_str(), 1);
+    ::setenv("XDG_CACHE_HOME", scratch_.path().c_str(), 1);
     const std::string cached = modelPathOf("/nowhere/a.ply");
     EXPECT_TRUE(cached.starts_with(path("pietra/"))) << cached;
     EXPECT_NE(cached, modelPathOf("/elsewhere/a.ply"));

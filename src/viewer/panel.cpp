@@ -26,6 +26,7 @@ constexpr const char* kHelp =
     "A               1 or 4 samples a pixel\n"
     "L + drag        move the light\n"
     "Z               freeze what is selected, and where from\n"
+    "O               when frozen: hidden parts red, seen ones green\n"
     "B               bounds of what is drawn: tight, saturated\n"
     "D               measure a distance by two clicks\n"
     "C               record the camera's path\n"
@@ -57,7 +58,9 @@ void drawFigures(const FrameFigures& figures) {
     text(fmt::format("read {}", formatBytes(figures.bytes_read)));
     text(fmt::format("drawn by {}", figures.renderer));
     text(fmt::format("within {:.3g} px{}", figures.tolerance_px,
-                     figures.converged ? "" : ", loading"));
+                     !figures.settled          ? ", loading"
+                     : figures.short_of_memory ? ": no memory for more"
+                                               : ""));
 }
 
 void drawSettings(ViewState& state, const CameraControl& control) {
@@ -76,6 +79,7 @@ void drawSettings(ViewState& state, const CameraControl& control) {
     ImGui::Checkbox("prefetch", &state.prefetch);
     ImGui::SameLine();
     ImGui::Checkbox("frozen", &state.frozen);
+    if (state.frozen) ImGui::Checkbox("hidden parts red, seen ones green", &state.show_hidden);
     text(control.style() == CameraControl::Style::kTurntable ? "turntable" : "trackball");
     if (state.recording) text("recording the path: C ends");
     if (state.measuring)

@@ -20,7 +20,8 @@ struct ViewState {
     Show show = Show::kShaded;
     bool prefetch = true;
     bool show_panel = true, show_help = false;
-    bool frozen = false;  ///< what is drawn stays as selected, wherever the camera goes
+    bool frozen = false;       ///< what is drawn stays as selected, wherever the camera goes
+    bool show_hidden = false;  ///< when frozen: what others hide red, all else green
     ShowSpheres spheres = ShowSpheres::kNone;  ///< of the nodes drawn
     bool recording = false;
     bool measuring = false;
@@ -37,7 +38,8 @@ struct FrameFigures {
     double draw_ms = 0;
     double gpu_ms = 0;  ///< by the GPU's own clock; 0: not known
     double tolerance_px = 0;
-    bool converged = false;
+    bool settled = false;          ///< this is what will be seen at rest
+    bool short_of_memory = false;  ///< for the tolerance asked for
     uint64_t triangles = 0, patches = 0;
     size_t resident_bytes = 0, ram_bytes = 0;
     size_t device_bytes = 0, vram_bytes = 0;  ///< there is none if 0

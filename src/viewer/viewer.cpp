@@ -6,7 +6,6 @@
 #include <imgui.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -14,8 +13,10 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "runtime/camera_path.h"
 #include "runtime/pick.h"
+#include "runtime/up_axis.h"
 #include "viewer/open_files.h"
 #include "viewer/panel.h"
 #include "viewer/screen.h"
@@ -24,17 +25,12 @@
 namespace pietra {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr double kFluentMs = 40;      // frames in motion may take this long
 constexpr double kMostCoarsened = 8;  // by which the tolerance is raised for that, at most
 constexpr double kAtRestSeconds = 0.15;
 constexpr double kRecordSeconds = 0.1;  // between two keys of a recorded path
 constexpr double kZoomStep = 0.85;
-
-double secondsSince(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
+constexpr Rgba8 kHiddenTint{255, 90, 80, 255}, kSeenTint{120, 235, 130, 255};
 
 /// A name that is not taken: `stem`-1.`ending` and so on, in the current folder.
 std::string freeName(const char* stem, const char* ending) {
@@ -50,8 +46,8 @@ public:
         : files_(files),
           settings_(settings),
           screen_(openScreen()),
-          control_(wholeScene(Box3d{{Vec3d(0)}, {Vec3d(1)}})) {
-        nothing_.converged = true;
+          control_(wholeScene(Box3d{{Vec3d(0)}, {Vec3d(1)}}, UpAxis::kZ)) {
+        nothing_.settled = true;
         if (!settings.script.empty()) script_ = Script(settings.script);
         showModels();
         state_.pixels = settings.pixels;
@@ -62,7 +58,7 @@ public:
 
     void run() {
         while (!quit_) {
-            const auto start = Clock::now();
+            const Stopwatch watch;
             handleEvents();
             flyByKeys();
             openWhatIsBuilt();
@@ -70,7 +66,7 @@ public:
             if (!ready()) drawScene();
             present();
             screen_->swap();
-            last_frame_ = secondsSince(start);
+            last_frame_ = watch.seconds();
             if (!ready()) figures_.add(float(1e3 * last_frame_));
             record();
         }
@@ -79,7 +75,7 @@ public:
 private:
     std::unique_ptr<Screen> openScreen();
     PageSink* sink() const { return screen_->renderer().sink(); }
-    CameraControl wholeScene(const Box3d& bounds) const;
+    CameraControl wholeScene(const Box3d& bounds, UpAxis up) const;
     void showModels();
     void openWhatIsBuilt();
     void drop(const std::string& file);
@@ -92,12 +88,15 @@ private:
     void zoomTo(int steps);
     void flyByKeys();
     void setPixels(double pixels);
-    void touch() { touched_ = Clock::now(); }
-    bool moving() const { return secondsSince(touched_) < kAtRestSeconds; }
+    void touch() { touched_.restart(); }
+    bool moving() const { return touched_.seconds() < kAtRestSeconds; }
     /// The picture on the screen is the one asked for.
-    bool ready() const { return picture_size_.width > 0 && figures_.converged && !moving(); }
+    bool ready() const { return picture_size_.width > 0 && figures_.settled && !moving(); }
 
     void drawScene();
+    std::vector<ModelPatches> drawList(const Camera& camera, const Frame& frame) const;
+    void findHidden(const Frame& frame);
+    void markHidden(std::vector<ModelPatches>& list);
     ShadeSettings shade() const;
     void adaptToMotion();
     void present();
@@ -133,8 +132,10 @@ private:
         int measured;  // which end of the distance, or -1
     };
     std::vector<Pick> picks_;
-    Clock::time_point start_ = Clock::now(), touched_ = Clock::now(), last_key_{};
+    Stopwatch running_, touched_, last_key_;
     Camera frozen_camera_;
+    std::vector<uint32_t> hidden_;                // ids of patches that others hide from there
+    std::vector<std::vector<DrawPatch>> marked_;  // coloured by that
     CameraPath path_;
     double path_start_ = 0;
     int cursor_x_ = 0, cursor_y_ = 0;
@@ -153,9 +154,8 @@ std::unique_ptr<Screen> Viewer::openScreen() {
     }
 }
 
-CameraControl Viewer::wholeScene(const Box3d& bounds) const {
-    return {bounds, settings_.up,
-            standardCamera(StandardView::kFront, settings_.up, bounds, screen_->size())};
+CameraControl Viewer::wholeScene(const Box3d& bounds, UpAxis up) const {
+    return {bounds, up, standardCamera(StandardView::kFront, up, bounds, screen_->size())};
 }
 
 /// The models that are open now; the camera stays where it is, but for the first ones.
@@ -169,7 +169,9 @@ void Viewer::showModels() {
     settings.sink = sink();
     scene_.emplace(models, settings);
     const Box3d bounds = boundsOf(models);
-    if (models_.empty()) control_ = wholeScene(bounds);
+    if (models_.empty())
+        control_ =
+            wholeScene(bounds, settings_.up ? *settings_.up : guessUpAxis(coarseSurface(models)));
     control_.setBounds(bounds);
     models_ = models;
     SDL_SetWindowTitle(screen_->window(),
@@ -299,6 +301,9 @@ void Viewer::handleKey(SDL_Keycode key) {
             break;
         case SDLK_z:
             state_.frozen = !state_.frozen;
+            break;
+        case SDLK_o:
+            state_.show_hidden = !state_.show_hidden;
             break;
         case SDLK_d:
             state_.measuring = !state_.measuring;
@@ -454,23 +459,21 @@ void Viewer::drawScene() {
     request.camera = frozen_camera_;
     request.size = size;
     request.pixels = state_.pixels * motion_factor_;
-    request.seconds = secondsSince(start_);
+    request.seconds = running_.seconds();
     request.prefetch = state_.prefetch;
     request.show_error = state_.show == Show::kError;
     const Frame& frame = scene_ ? scene_->update(request) : nothing_;
     shown_ = &frame;
-    const auto start = Clock::now();
-    const Lattice none;
-    std::vector<ModelPatches> list;
-    for (size_t m = 0; m < models_.size(); ++m) {
-        const Lattice& lattice = models_[m]->info().lattice;
-        list.push_back({View(control_.camera(), size, lattice), &lattice, frame.models[m].patches});
-    }
-    if (list.empty()) list.push_back({View(control_.camera(), size, none), &none, {}});
+    const Stopwatch watch;
+    const bool show_hidden = state_.frozen && state_.show_hidden;
+    if (show_hidden) findHidden(frame);
+    std::vector<ModelPatches> list = drawList(control_.camera(), frame);
+    if (show_hidden) markHidden(list);
     screen_->renderer().draw(list, {shade(), state_.samples, request.culling.occlusion});
-    figures_.draw_ms = 1e3 * secondsSince(start);
+    figures_.draw_ms = watch.ms();
     figures_.tolerance_px = frame.tolerance_px;
-    figures_.converged = frame.converged && motion_factor_ == 1;
+    figures_.settled = frame.settled && motion_factor_ == 1;
+    figures_.short_of_memory = frame.raised;
     figures_.triangles = frame.triangles;
     figures_.patches = frame.patch_count;
     figures_.gpu_ms = screen_->renderer().gpuMs();
@@ -478,6 +481,43 @@ void Viewer::drawScene() {
     figures_.device_bytes = frame.device_bytes;
     figures_.bytes_read = frame.bytes_read;
     picture_size_ = size;
+}
+
+std::vector<ModelPatches> Viewer::drawList(const Camera& camera, const Frame& frame) const {
+    static const Lattice none;
+    const PictureSize size = screen_->size();
+    std::vector<ModelPatches> list;
+    for (size_t m = 0; m < models_.size(); ++m) {
+        const Lattice& lattice = models_[m]->info().lattice;
+        list.push_back({View(camera, size, lattice), &lattice, frame.models[m].patches});
+    }
+    if (list.empty()) list.push_back({View(camera, size, none), &none, {}});
+    return list;
+}
+
+/// What others hide from where the selection is frozen: twice, as OpenGL draws all that was not
+/// hidden before.
+void Viewer::findHidden(const Frame& frame) {
+    for (int round = 0; round < 2; ++round) {
+        hidden_.clear();
+        screen_->renderer().draw(drawList(frozen_camera_, frame),
+                                 {.shade = shade(), .hidden = &hidden_});
+    }
+    std::sort(hidden_.begin(), hidden_.end());
+}
+
+void Viewer::markHidden(std::vector<ModelPatches>& list) {
+    marked_.clear();
+    for (ModelPatches& model : list) {
+        std::vector<DrawPatch>& marked = marked_.emplace_back();
+        for (DrawPatch patch : model.patches) {
+            const bool hidden = std::binary_search(hidden_.begin(), hidden_.end(), patch.id);
+            patch.tint = hidden ? kHiddenTint : kSeenTint;
+            patch.one_sided = false;  // from the back, too
+            marked.push_back(patch);
+        }
+        model.patches = marked;
+    }
 }
 
 void Viewer::present() {
@@ -493,7 +533,8 @@ void Viewer::present() {
                  .models = models_,
                  .frame = shown_});
     if (before.pixels != state_.pixels || before.show != state_.show ||
-        before.samples != state_.samples || before.frozen != state_.frozen)
+        before.samples != state_.samples || before.frozen != state_.frozen ||
+        before.show_hidden != state_.show_hidden)
         touch();
     ImGui::Render();
     screen_->show(*ImGui::GetDrawData());
@@ -526,7 +567,7 @@ void Viewer::toggleRecording() {
     state_.recording = !state_.recording;
     if (state_.recording) {
         path_ = {};
-        path_start_ = secondsSince(start_);
+        path_start_ = running_.seconds();
         state_.message = "recording";
         return;
     }
@@ -540,9 +581,9 @@ void Viewer::toggleRecording() {
 }
 
 void Viewer::record() {
-    if (!state_.recording || secondsSince(last_key_) < kRecordSeconds) return;
-    last_key_ = Clock::now();
-    path_.keys.push_back({secondsSince(start_) - path_start_, control_.camera()});
+    if (!state_.recording || last_key_.seconds() < kRecordSeconds) return;
+    last_key_.restart();
+    path_.keys.push_back({running_.seconds() - path_start_, control_.camera()});
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 // may be raised so that frames stay fluent; at rest it is what was asked for.
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,7 +28,7 @@ struct ViewerSettings {
     size_t vram_bytes = size_t(1) << 30;           ///< for OpenGL
     std::function<void(const std::string&)> tell;  ///< takes notices; may be empty
     GlMessageHandler gl_messages;  ///< if not empty, OpenGL is asked to check what it is told
-    UpAxis up = UpAxis::kZ;
+    std::optional<UpAxis> up;      ///< none: guessed (runtime/up_axis.h)
     /// A file of commands to run as if a user did (viewer/script.h); empty: none.
     std::string script;
     std::string program = "/proc/self/exe";  ///< builds the models of meshes

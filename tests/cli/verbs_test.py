@@ -390,6 +390,7 @@ class Shown(VerbTest):
         run = self.run_pietra(*look, "--renderer", "gl", env=none)
         self.assertEqual(run.returncode, 2)
         self.assertTrue(run.stderr.startswith("pietra: --renderer gl: "), run.stderr)
+
     def test_bench_writes_a_page(self):
         html = os.path.join(self.folder, "r.html")
         whole = {"target": [0, 0, 0], "up": [0, 0, 1], "fovy_deg": 45}
@@ -412,7 +413,8 @@ class Shown(VerbTest):
 
     def test_view_does_as_a_script_says(self):
         self.write("s.txt", "# turn it\nwait\nscreenshot a.png\ndrag left 200 150 300 180\n"
-                   "wheel 3 200 150\nkey 5\nwait\nscreenshot b.png\nquit\n")
+                   "wheel 3 200 150\nkey 5\nwait\nscreenshot b.png\n"
+                   "key 1\nkey Z\nwait\nscreenshot c.png\nkey O\nwait\nscreenshot d.png\nquit\n")
         # SDL loads graphics drivers, which leave memory behind: nothing for a leak checker.
         screen = {"SDL_VIDEODRIVER": "offscreen", "ASAN_OPTIONS": "detect_leaks=0"}
         run = self.run_pietra("view", "statue.pietra", "--size", "400x300", "--script", "s.txt",
@@ -420,6 +422,8 @@ class Shown(VerbTest):
         self.assertEqual((run.returncode, run.stdout), (0, ""), run.stderr)
         moved = self.report("compare", "a.png", "b.png", "--json")
         self.assertGreater(moved["shade"]["p99"], 20)
+        green = self.report("compare", "c.png", "d.png", "--json")  # what is seen from there
+        self.assertGreater(green["shade"]["p99"], 20)
         # A mesh is offered, built beside the window when accepted, and shown; or it is dropped.
         for first, script in (("torus.ply", "key Return\n"), ("statue.pietra", "drop torus.ply\n")):
             write_torus(self.path("torus.ply"), 40, 24)

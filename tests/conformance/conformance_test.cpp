@@ -1,6 +1,7 @@
 // What every method promises, for every kind of input. A new method is tested here as soon as it
 // stands in the method table.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -10,10 +11,12 @@
 #include <optional>
 #include <set>
 
+#include "audit/adaptive_check.h"
 #include "audit/certificate.h"
 #include "audit/cracks.h"
 #include "audit/mesh_topology.h"
 #include "base/error.h"
+#include "base/scratch_directory.h"
 #include "methods/method_table.h"
 #include "multires/cut.h"
 #include "render/offline/offline_picture.h"
@@ -28,19 +31,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class Scratch {
-public:
-    Scratch() : path_((fs::temp_directory_path() / "pietra-conformance-XXXXXX").string()) {
-        if (!::mkdtemp(path_.data())) throw std::runtime_error("mkdtemp");
-    }
-    ~Scratch() { fs::remove_all(path_); }
-    std::string file(const std::string& name) const { return path_ + "/" + name; }
-    const std::string& path() const { return path_; }
-
-private:
-    std::string path_;
-};
-
 std::string bytesOf(const std::string& path) {
     std::ifstream in(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(in), {}};
@@ -52,6 +42,29 @@ const std::vector<ConformanceMesh>& meshes() {
     return all;
 }
 
+/// In patches so small that there are several levels.
+BuildReport buildSmall(const Method& method, TriangleSource& source,
+                       const ScratchDirectory& scratch, const std::string& name, int jobs,
+                       size_t memory) {
+    BuildSettings settings;
+    settings.output = scratch.file(name);
+    settings.force = true;
+    settings.memory_bytes = memory;
+    settings.jobs = jobs;
+    settings.temp_dir = scratch.path();
+    settings.leaf_triangles = 700;
+    settings.patch_triangles = 500;
+    settings.input_name = name;
+    Progress progress;
+    return method.build(source, settings, progress);
+}
+
+PatchStream streamOf(const ModelReader& model) {
+    return [&model](std::span<const NodeIndex> nodes, const PatchVisitor& visit) {
+        visitPatches(model, nodes, visit);
+    };
+}
+
 class Conformance : public testing::TestWithParam<std::tuple<size_t, size_t>> {
 protected:
     const Method& method() const { return methods()[std::get<0>(GetParam())]; }
@@ -60,23 +73,7 @@ protected:
     bool hasLevels() const { return !method().open || mesh().name != "dust"; }
 
     BuildReport build(const std::string& name, int jobs = 2, size_t memory = size_t(1) << 30) {
-        BuildSettings settings;
-        settings.output = scratch_.file(name);
-        settings.force = true;
-        settings.memory_bytes = memory;
-        settings.jobs = jobs;
-        settings.temp_dir = scratch_.path();
-        settings.leaf_triangles = 700;
-        settings.patch_triangles = 500;
-        settings.input_name = mesh().name;
-        Progress progress;
-        return method().build(*mesh().source(), settings, progress);
-    }
-
-    PatchStream streamOf(const ModelReader& model) const {
-        return [&model](std::span<const NodeIndex> nodes, const PatchVisitor& visit) {
-            visitPatches(model, nodes, visit);
-        };
+        return buildSmall(method(), *mesh().source(), scratch_, name, jobs, memory);
     }
 
     VerifyReport verify(const ModelReader& model) const {
@@ -87,7 +84,7 @@ protected:
                            [&](uint32_t page) { return adaptive->pageFault(page); });
     }
 
-    Scratch scratch_;
+    const ScratchDirectory scratch_;
     Budget budget_{size_t(512) << 20};
 };
 
@@ -347,6 +344,48 @@ TEST_P(AdaptiveConformance, finerIsNeverCoarser) {
 TEST_P(AdaptiveConformance, tooLittleMemorySaysHowMuch) {
     Budget little(hasLevels() ? size_t(1) << 20 : 0);
     EXPECT_THROW(adaptive_->cut({}, little), MemoryError);
+}
+
+std::string plyOf(TriangleSource& source) {
+    std::string vertices, faces;
+    VertexBatch positions;
+    while (source.readVertices(positions))
+        for (const Vec3d& p : positions.position)
+            vertices += fmt::format("{} {} {}\n", p.x, p.y, p.z);
+    TriangleBatch triangles;
+    while (source.readTriangles(triangles))
+        for (const auto& t : triangles.triangle)
+            faces += fmt::format("3 {} {} {}\n", t[0], t[1], t[2]);
+    return fmt::format(
+               "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\n"
+               "property double z\nelement face {}\nproperty list uchar int vertex_indices\n"
+               "end_header\n",
+               source.vertexCount(), source.triangleCountHint()) +
+           vertices + faces;
+}
+
+/// Also those inputs that have made builders stumble.
+TEST(EveryMethod, passesTheAuditOfEveryInput) {
+    for (const Method& method : methods())
+        for (const ConformanceInput& input : conformanceInputs()) {
+            SCOPED_TRACE(std::string(method.name) + ", " + input.name);
+            const ScratchDirectory scratch;
+            buildSmall(method, *input.open(), scratch, "model", 2, size_t(256) << 20);
+            const ModelReader model(scratch.file("model"));
+            Budget budget(size_t(256) << 20);
+            Progress progress;
+            ModelCheckSettings settings;
+            settings.cuts = 12;
+            settings.samples = 100'000;
+            settings.input = {scratch.write("input.ply", plyOf(*input.open()))};
+            settings.temp_dir = scratch.path();
+            const auto adaptive = openAdaptive(model);
+            const ModelCheckReport report =
+                adaptive ? checkAdaptive(model, *adaptive, settings, budget, progress)
+                         : checkModel(model, settings, budget, progress);
+            EXPECT_TRUE(report.ok()) << (report.faults.empty() ? "" : report.faults[0]);
+            EXPECT_TRUE(report.file.ok()) << report.file.faults.size();
+        }
 }
 
 }  // namespace

@@ -19,12 +19,12 @@ public:
     /// Only what the file says, which must be given.
     Camera fromFile() const;
 
-    /// The --up option alone, for verbs that take no standard view.
-    void declareUp(OptionSet& options);
+    /// Some of the options alone, for verbs that take no standard view.
+    void declareUp(OptionSet& options, const char* help);
     void declareFile(OptionSet& options);
+    UpAxis up() const { return up_ == "y" ? UpAxis::kY : UpAxis::kZ; }
 
 private:
-    Vec3d up() const { return up_ == "y" ? Vec3d(0, 1, 0) : Vec3d(0, 0, 1); }
     std::string file_;
     std::string view_;
     std::string up_ = "z";

@@ -4,32 +4,25 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <deque>
 #include <fstream>
 #include <memory>
 #include <sstream>
-#include <thread>
 
 #include "apps/pietra/static_list.h"
 #include "base/budget.h"
 #include "base/check.h"
+#include "base/stopwatch.h"
 #include "render/live/gl_live.h"
 #include "runtime/patch_reader.h"
 
 namespace pietra {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr int kSampledFrames = 24;
 constexpr int kRepeats = 3;
 constexpr double kMostWaitMs = 60'000;
-
-double msSince(Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 class Flight {
 public:
@@ -42,15 +35,15 @@ public:
           scene_(models, sceneSettings()) {}
 
     FlightRecord run(const std::function<void(int)>& progress) {
-        const auto start = Clock::now();
+        const Stopwatch watch;
         for (int i = 0; i < settings_.frames; ++i) {
-            if (settings_.real_time) waitFor(start, timeOf(i));
+            if (settings_.real_time) watch.wait(timeOf(i));
             record_.frames.push_back(frame(request(i)));
             record_.frames.back().seconds = timeOf(i);
             record_.frames.back().process_bytes = residentBytes();
             progress(i);
         }
-        record_.seconds = msSince(start) / 1e3;
+        record_.seconds = watch.seconds();
         awaitConvergence();
         if (settings_.compare) compareWithStaticDraws(progress);
         record_.faults = scene_.faults();
@@ -81,11 +74,6 @@ private:
         return settings_.frames == 1 ? 0 : path_.seconds * i / (settings_.frames - 1);
     }
 
-    static void waitFor(Clock::time_point start, double seconds) {
-        std::this_thread::sleep_until(start + std::chrono::duration_cast<Clock::duration>(
-                                                  std::chrono::duration<double>(seconds)));
-    }
-
     FrameRequest request(int i) const {
         FrameRequest request;
         request.camera = path_.frame(i, settings_.frames);
@@ -98,7 +86,7 @@ private:
     }
 
     FrameRecord frame(const FrameRequest& request) {
-        const auto start = Clock::now();
+        const Stopwatch watch;
         const Frame& frame = scene_.update(request);
         FrameRecord record;
         record.select_ms = frame.select_ms;
@@ -107,7 +95,7 @@ private:
             record.draw_ms = draw(frame, patchesOf(frame));
             record.gpu_ms = renderer_->gpuMs();
         }
-        record.ms = msSince(start);
+        record.ms = watch.ms();
         record.triangles = frame.triangles;
         record.patches = frame.patch_count;
         record.bytes_read = frame.bytes_read - bytes_read_;
@@ -116,6 +104,7 @@ private:
         record.device_bytes = frame.device_bytes;
         record.tolerance_px = frame.tolerance_px;
         record.converged = frame.converged;
+        record.settled = frame.settled;
         if (record_.first_image_ms < 0 && record.tolerance_px <= kFirstImagePx)
             record_.first_image_ms = msSinceStart();
         return record;
@@ -130,29 +119,28 @@ private:
     }
 
     double draw(const Frame& frame, const Lists& lists) {
-        const auto start = Clock::now();
+        const Stopwatch watch;
         std::vector<ModelPatches> list;
         for (size_t m = 0; m < frame.models.size(); ++m)
             list.push_back({frame.models[m].view, &models_[m]->info().lattice, lists[m]});
         renderer_->draw(list, {{}, settings_.samples, settings_.culling.occlusion});
         renderer_->wait();
-        return msSince(start);
+        return watch.ms();
     }
 
     void awaitConvergence() {
-        const auto stop = Clock::now();
+        const Stopwatch stopped;
         FrameRequest last = request(settings_.frames - 1);
-        while (msSince(stop) < kMostWaitMs) {
+        while (stopped.ms() < kMostWaitMs) {
             last.seconds += 1.0 / 60;
-            if (frame(last).converged) {
-                record_.converged_ms = msSince(stop);
-                return;
-            }
+            const FrameRecord found = frame(last);
+            if (found.converged) record_.converged_ms = stopped.ms();
+            if (found.settled) return;
         }
     }
 
     void compareWithStaticDraws(const std::function<void(int)>& progress) {
-        const auto start = Clock::now();
+        const Stopwatch watch;
         std::vector<double> ratios;
         const int step = std::max(1, settings_.frames / kSampledFrames);
         for (int i = 0; i < settings_.frames; ++i) {
@@ -160,7 +148,7 @@ private:
             view.prefetch = false;
             const Frame& resident = scene_.converge(view);
             // At the flight's own pace: threads that wake up and cold caches are no overhead.
-            if (settings_.real_time) waitFor(start, timeOf(i));
+            if (settings_.real_time) watch.wait(timeOf(i));
             record_.frames[i].static_ms = draw(resident, patchesOf(resident));
             if (i % step == 0) ratios.push_back(overhead(view, resident));
             progress(i);

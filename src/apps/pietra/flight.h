@@ -39,14 +39,15 @@ struct FrameRecord {
     size_t resident_bytes = 0, device_bytes = 0;  ///< of pages, in RAM and in graphics memory
     size_t process_bytes = 0;                     ///< of all that the process has in RAM
     double tolerance_px = 0;
-    bool converged = false;
+    bool converged = false, settled = false;
 };
 
 struct FlightRecord {
     std::vector<FrameRecord> frames;
     double seconds = 0;          ///< of the flight
     double first_image_ms = -1;  ///< since the process began: a picture at kFirstImagePx; -1: none
-    double converged_ms = -1;    ///< after the last frame; -1: not within a minute
+    double converged_ms = -1;    ///< after the last frame; -1: not within a minute, or there is
+                                 ///< no memory for it
     /// Of sampled frames with everything resident: the whole frame over drawing its list as one
     /// static, cache-ordered buffer, in turn; the median.
     double overhead_ratio = 0;

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "apps/pietra/camera_json.h"
+#include "apps/pietra/camera_options.h"
 #include "apps/pietra/draw_options.h"
 #include "apps/pietra/flight_report.h"
 #include "apps/pietra/json_report.h"
@@ -47,7 +48,7 @@ private:
 
     std::vector<std::string> files_;
     std::string path_;
-    std::string up_ = "z";
+    CameraOptions camera_;
     std::optional<uint64_t> frames_;
     PictureSize size_;
     double pixels_ = 1;
@@ -95,7 +96,7 @@ void BenchVerb::declare(OptionSet& options) {
               "\"keys\":[{\"t\":0, \"eye\":[x,y,z], \"target\":[x,y,z], \"up\":[x,y,z], "
               "\"fovy_deg\":45}, ...]}.")
         .require();
-    options.choice("--up", up_, {"y", "z"}, "Which axis points up where the path does not say.");
+    camera_.declareUp(options, "Which axis points up where the path does not say.");
     options.count("--frames", "N", frames_, {.min = 1, .max = 1000000}, "Frames of the path.")
         .defaultsTo("60 a second");
     options.pictureSize("--size", size_, "Of the picture, in pixels.");
@@ -116,11 +117,9 @@ void BenchVerb::declare(OptionSet& options) {
 }
 
 CameraPath BenchVerb::path(const ModelFiles& files) const {
-    const bool y = up_ == "y";
     if (const auto known = parseStandardPath(path_))
-        return standardPath(*known, coarseSurface(files.views()), y ? UpAxis::kY : UpAxis::kZ,
-                            size_);
-    return readCameraPath(path_, y ? Vec3d(0, 1, 0) : Vec3d(0, 0, 1));
+        return standardPath(*known, coarseSurface(files.views()), camera_.up(), size_);
+    return readCameraPath(path_, upVector(camera_.up()));
 }
 
 FlightSettings BenchVerb::settings(const CameraPath& path) const {

@@ -88,7 +88,7 @@ void ExtractVerb::declare(OptionSet& options) {
                   "The mesh of least error with at most N triangles.");
     options.flag("--full", full_, "All triangles of the input.");
     camera_.declareFile(options);
-    camera_.declareUp(options);
+    camera_.declareUp(options, "Which axis points up in cameras that do not say.");
     options.number("--pixels", "T", pixels_, {.min = 0}, "With --camera: tolerance in pixels.");
     options.pictureSize("--size", size_, "With --camera: of the picture, in pixels.");
     limits_.declare(options);

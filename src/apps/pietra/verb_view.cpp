@@ -29,7 +29,7 @@ private:
     PictureSize size_{1280, 800};
     double pixels_ = 1;
     std::string renderer_ = "auto";
-    std::string up_ = "z";
+    std::string up_ = "auto";
     std::string script_;
     uint64_t ram_ = uint64_t(1) << 30, vram_ = uint64_t(1) << 30;
     std::optional<uint64_t> jobs_;
@@ -41,11 +41,12 @@ VerbText ViewVerb::text() const {
         "look at models in a window",
         {"FILE... [options]"},
         {"Opens a window at once, and shows the models as finely as --pixels asks for. What has "
-         "not been loaded yet is drawn coarser, without holes. A graphics card with OpenGL 4.5 draws "
+         "not been loaded yet is drawn coarser, without holes. A graphics card with OpenGL 4.5 "
+         "draws "
          "where there is one, else the processor.",
          "A mesh is offered to be built first: its model is put beside it, or into the user's "
-         "cache "
-         "where that folder cannot be written. Files dropped on the window are added, meshes built "
+         "cache where that folder cannot be written. Files dropped on the window are added, meshes "
+         "built "
          "in the background.",
          "F1 in the window lists what mouse and keys do."},
         {{"look at a model", "pietra view moon.pietra"},
@@ -58,7 +59,8 @@ void ViewVerb::declare(OptionSet& options) {
     options.number("--pixels", "T", pixels_, {.min = 0.25, .max = 64}, "Tolerance in pixels.");
     options.choice("--renderer", renderer_, {"auto", "gl", "cpu"},
                    "What draws; auto: OpenGL where a graphics card does it, else the processor.");
-    options.choice("--up", up_, {"y", "z"}, "Which axis points up.");
+    options.choice("--up", up_, {"auto", "y", "z"},
+                   "Which axis points up; auto: what the models seem to stand on.");
     options.size("--ram", ram_, "Most memory for what is loaded.");
     declareVram(options, vram_);
     options.text(
@@ -77,7 +79,7 @@ int ViewVerb::run(const RunContext& context) {
     ViewerSettings settings;
     settings.size = size_;
     settings.pixels = pixels_;
-    settings.up = up_ == "y" ? UpAxis::kY : UpAxis::kZ;
+    if (up_ != "auto") settings.up = up_ == "y" ? UpAxis::kY : UpAxis::kZ;
     settings.scene.ram_bytes = size_t(ram_);
     settings.vram_bytes = size_t(vram_);
     settings.renderer = renderer_ == "auto" ? ViewerRenderer::kAuto

@@ -22,14 +22,17 @@ constexpr const char* kLookDefines[kLooks] = {
     "#define BASE VERTEX_COLOUR\n#define LIGHT LIT\n#define WIRE\n",
 };
 
-std::string lightDefines() {
+std::string shadingDefines() {
     const auto vector = [](const float(&v)[3]) {
         return fmt::format("vec3({:.6f}, {:.6f}, {:.6f})", v[0], v[1], v[2]);
     };
     return fmt::format(
         "#define KEY_LIGHT {}\n#define SKY_LIGHT {}\n#define GROUND_LIGHT {}\n"
-        "#define EYE_LIGHT {:.6f}\n#define SHINE {:.6f}\n",
-        vector(kKeyLight), vector(kSkyLight), vector(kGroundLight), kEyeLight, kShine);
+        "#define EYE_LIGHT {:.6f}\n#define SHINE {:.6f}\n"
+        "#define WIRE_REACH {:.6f}\n#define WIRE_DARKNESS {:.6f}\n"
+        "#define WIRE_LEAST_HEIGHT {:.6f}\n#define WIRE_FADE {:.6f}\n",
+        vector(kKeyLight), vector(kSkyLight), vector(kGroundLight), kEyeLight, kShine, kWireReach,
+        kWireDarkness, kWireLeastHeight, kWireFade);
 }
 
 }  // namespace
@@ -67,7 +70,7 @@ std::array<GlProgram, kLooks> makeDrawPrograms(int samples) {
                            {"frame_block.glsl", "srgb.glsl", "patch_draw.frag.glsl"}};
     for (size_t i = 0; i < kLooks; ++i) {
         const std::string defines =
-            fmt::format("{}#define SAMPLES {}\n{}", kLookDefines[i], samples, lightDefines());
+            fmt::format("{}#define SAMPLES {}\n{}", kLookDefines[i], samples, shadingDefines());
         programs[i] = Look(i) < Look::kWire ? makeProgram({vertex, fragment}, defines)
                                             : makeProgram({vertex, wire, fragment}, defines);
     }

@@ -72,14 +72,14 @@ void OcclusionCuller::end(size_t count) {
     compute(end_, count);
 }
 
-size_t OcclusionCuller::countDrawn(size_t count) const {
+std::vector<uint8_t> OcclusionCuller::drawn(size_t count) const {
     if (wait_) glFinish();
     std::vector<DrawCommand> commands(count);
-    size_t drawn = 0;
+    std::vector<uint8_t> drawn(count, 0);
     for (const GLuint buffer : {seen(), found()}) {
         glGetNamedBufferSubData(buffer, 0, GLsizeiptr(count * sizeof(DrawCommand)),
                                 commands.data());
-        for (const DrawCommand& command : commands) drawn += command.instances;
+        for (size_t i = 0; i < count; ++i) drawn[i] |= commands[i].instances != 0;
     }
     return drawn;
 }

@@ -9,6 +9,7 @@
 // nothing. Needs a current context.
 
 #include <cstdint>
+#include <vector>
 
 #include "render/gl/frame_block.h"
 #include "render/gl/program.h"
@@ -41,8 +42,9 @@ public:
     /// nor colour.
     void end(size_t count);
 
-    /// How many of the last `count` draws were not left out. Waits for the GPU: not for frames.
-    size_t countDrawn(size_t count) const;
+    /// Of the last `count` draws: not 0 for those that were not left out. Waits for the GPU: not
+    /// for frames.
+    std::vector<uint8_t> drawn(size_t count) const;
 
     /// Buffers of DrawCommand, to draw from.
     GLuint seen() const { return seen_; }

@@ -105,7 +105,7 @@ struct GlRenderer::State {
     double focal_px = 0;
     bool drawing = false;  // between begin() and finish()
     uint64_t uploaded_before = 0;
-    size_t last_culled = 0;  // draws of the culler's last use
+    std::vector<uint32_t>* hidden = nullptr;  // takes the ids of those left out
     GlStatistics statistics;
     std::vector<QueuedDraw> queue;  // of one draw(), kept for its memory
 
@@ -352,7 +352,11 @@ void GlRenderer::State::submit(std::span<const DrawPatch> items, std::span<const
         drawCommands(items, chunk, culler.seen(), 0);
         culler.end(chunk.size());
         drawCommands(items, chunk, culler.found(), 0);
-        last_culled = chunk.size();
+        if (hidden != nullptr) {
+            const std::vector<uint8_t> drawn = culler.drawn(chunk.size());
+            for (size_t i = 0; i < chunk.size(); ++i)
+                if (!drawn[i]) hidden->push_back(items[chunk[i].item].id);
+        }
     } else {
         drawCommands(items, chunk, ring.buffer(), commands.offset);
     }
@@ -448,12 +452,10 @@ void GlRenderer::draw(std::span<const DrawPatch> patches) {
     state_->drawInChunks(patches, false);
 }
 
-void GlRenderer::drawUnhidden(std::span<const DrawPatch> patches) {
+void GlRenderer::drawUnhidden(std::span<const DrawPatch> patches, std::vector<uint32_t>* hidden) {
+    state_->hidden = hidden;
     state_->drawInChunks(patches, true);
-}
-
-size_t GlRenderer::countUnhidden() const {
-    return state_->culler.countDrawn(state_->last_culled);
+    state_->hidden = nullptr;
 }
 
 void GlRenderer::finish() {

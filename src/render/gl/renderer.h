@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "geometry/lattice.h"
 #include "multires/page_sink.h"
@@ -70,11 +71,9 @@ public:
     void draw(std::span<const DrawPatch> patches);
     /// Draws the same, but leaves out on the GPU what is hidden (occlusion.h), by what is drawn
     /// already or by each other: for the frames of a flight, where most that is seen was seen
-    /// before. No pixel changes but where surfaces coincide.
-    void drawUnhidden(std::span<const DrawPatch> patches);
-    /// Of the patches that it drew last at a time, a call's if they are few, how many were not left
-    /// out. Waits for the GPU: not for frames.
-    size_t countUnhidden() const;
+    /// before. No pixel changes but where surfaces coincide. Appends the ids of those left out to
+    /// `hidden`, for which it waits.
+    void drawUnhidden(std::span<const DrawPatch> patches, std::vector<uint32_t>* hidden = nullptr);
     /// Completes the picture, without waiting for it. Nothing can be drawn before the next begin().
     void finish();
     /// Completes the picture and waits for it, as all that follows up to present().

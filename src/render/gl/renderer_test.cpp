@@ -355,9 +355,10 @@ TEST_F(GlRendererTest, LeavingOutWhatIsHiddenChangesNoPixel) {
             plain.begin(scene.view(), Lattice{}, {});
             plain.draw(list);
             culling.begin(scene.view(), Lattice{}, {});
-            culling.drawUnhidden(list);
+            std::vector<uint32_t> hidden;
+            culling.drawUnhidden(list, &hidden);
             submitted += list.size();
-            drawn += culling.countUnhidden();
+            drawn += list.size() - hidden.size();
             const Picture expected = plain.readPicture(), picture = culling.readPicture();
             expectSame(picture, expected, "frame " + std::to_string(frame));
         }
@@ -377,13 +378,13 @@ public:
     size_t look(const Vec3d& eye, const Vec3d& target) {
         scene_.look(eye, target, 60);
         renderer_.begin(scene_.view(), Lattice{}, {});
-        renderer_.drawUnhidden(items_);
+        std::vector<uint32_t> hidden;
+        renderer_.drawUnhidden(items_, &hidden);
         const Picture picture = renderer_.readPicture();
-        const size_t drawn = renderer_.countUnhidden();
         renderer_.begin(scene_.view(), Lattice{}, {});
         renderer_.draw(items_);
         expectSame(picture, renderer_.readPicture(), "unhidden");
-        return drawn;
+        return items_.size() - hidden.size();
     }
 
 private:

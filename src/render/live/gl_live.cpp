@@ -14,7 +14,7 @@ void GlLive::draw(std::span<const ModelPatches> models, const LiveSettings& sett
     for (const ModelPatches& model : models) {
         renderer_.setModel(model.view, *model.lattice);
         if (settings.leave_out_hidden)
-            renderer_.drawUnhidden(model.patches);
+            renderer_.drawUnhidden(model.patches, settings.hidden);
         else
             renderer_.draw(model.patches);
     }

@@ -17,6 +17,8 @@ struct LiveSettings {
     int samples = 1;  ///< or 4
     /// Patches that others hide may be left out: this changes no pixel.
     bool leave_out_hidden = true;
+    /// Takes the ids of those left out, and has draw() wait for them; null: nobody asks.
+    std::vector<uint32_t>* hidden = nullptr;
 };
 
 class LiveRenderer {

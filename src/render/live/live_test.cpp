@@ -1,7 +1,7 @@
-#include <filesystem>
 #include <random>
 #include <thread>
 
+#include "base/scratch_directory.h"
 #include "render/gl/test_context.h"
 #include "render/gl/test_pictures.h"
 #include "render/live/gl_live.h"
@@ -11,27 +11,18 @@
 namespace pietra {
 namespace {
 
-namespace fs = std::filesystem;
-
 class LiveTest : public GlTest {
 protected:
     void SetUp() override {
         GlTest::SetUp();
-        std::string pattern = (fs::temp_directory_path() / "pietra-live-XXXXXX").string();
-        if (::mkdtemp(pattern.data()) == nullptr) std::abort();
-        directory_ = pattern;
         ToyTerrainSettings settings;
         settings.depth = 11;
         for (const double x : {0.0, 45.0}) {
             settings.seed++;
-            const std::string path = directory_ + "/" + std::to_string(settings.seed);
-            writeTerrainModel(makeToyTerrain(settings), path, directory_, {x, 0, 0});
+            const std::string path = scratch_.file(std::to_string(settings.seed));
+            writeTerrainModel(makeToyTerrain(settings), path, scratch_.path(), {x, 0, 0});
             models_.push_back(std::make_unique<ModelReader>(path));
         }
-    }
-    void TearDown() override {
-        fs::remove_all(directory_);
-        GlTest::TearDown();
     }
 
     std::vector<const ModelReader*> readers() const { return {models_[0].get(), models_[1].get()}; }
@@ -59,7 +50,7 @@ protected:
         return list;
     }
 
-    std::string directory_;
+    const ScratchDirectory scratch_;
     std::vector<std::unique_ptr<ModelReader>> models_;
 };
 

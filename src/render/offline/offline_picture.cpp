@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <mutex>
 
 #include "base/check.h"
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "base/text.h"
 #include "render/offline/batch_drawer.h"
 #include "runtime/eye_side.h"
@@ -18,8 +18,6 @@ namespace pietra {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 /// Larger batches draw no faster.
 constexpr size_t kLargestBatch = size_t(256) << 20, kLargestGlBatch = size_t(64) << 20;
 /// What the renderers keep of a pixel with one sample and with four (rasteriser.h, gl/renderer.h),
@@ -28,10 +26,6 @@ constexpr size_t kRasterPixelBytes[2] = {17, 49}, kGlPixelBytes[2] = {16, 40};
 constexpr size_t kPictureBytes = sizeof(Rgba8) + sizeof(float);
 /// Threads with their stacks and heaps, and what else nobody counts.
 constexpr size_t kUncountedBytes = size_t(3) << 20;
-
-double msSince(Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 /// A model in the scene, with what is drawn of it.
 struct SceneModel {
@@ -55,7 +49,7 @@ public:
     }
 
     OfflinePicture run() {
-        const auto start = Clock::now();
+        const Stopwatch watch;
         uint64_t patches = 0;
         for (const SceneModel& model : models_)
             settings_.shade.two_sided =
@@ -66,7 +60,7 @@ public:
             patches += model.cut.nodes.size();
         }
         setValueRange();
-        result_.statistics.select_ms = msSince(start);
+        result_.statistics.select_ms = watch.ms();
         planMemory();
         progress_.beginStage("draw", patches);
         const auto make = onGpu() ? makeGlDrawer : makeRasterDrawer;
@@ -77,7 +71,7 @@ public:
         result_.picture = drawer->finish();
         progress_.endStage();
         report(drawer->statistics());
-        result_.statistics.total_ms = msSince(start);
+        result_.statistics.total_ms = watch.ms();
         return std::move(result_);
     }
 

@@ -3,35 +3,25 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/scratch_directory.h"
 #include "store/terrain_model.h"
 
 namespace pietra {
 namespace {
 
-namespace fs = std::filesystem;
-
 class OfflineTest : public ::testing::Test {
 protected:
-    OfflineTest() {
-        std::string pattern = (fs::temp_directory_path() / "pietra-offline-XXXXXX").string();
-        if (::mkdtemp(pattern.data()) == nullptr) std::abort();
-        directory_ = pattern;
-    }
-    ~OfflineTest() override { fs::remove_all(directory_); }
-
     std::string writeTerrain(const std::string& name, const Vec3d& origin) const {
-        const std::string path = directory_ + "/" + name;
-        writeTerrainModel(makeToyTerrain(), path, directory_, origin);
+        const std::string path = scratch_.file(name);
+        writeTerrainModel(makeToyTerrain(), path, scratch_.path(), origin);
         return path;
     }
 
 private:
-    std::string directory_;
+    const ScratchDirectory scratch_;
 };
 
 struct Terrain {

@@ -1,6 +1,6 @@
 #pragma once
-// What one call of draw() works on: patches with their screen vertices side by side, and a number
-// for every triangle of the call.
+// What is drawn at once: patches with their screen vertices side by side, and a number for every
+// triangle.
 
 #include <cstddef>
 #include <cstdint>
@@ -52,7 +52,7 @@ struct Batch {
     std::vector<BatchModel> model;
     std::vector<BatchPatch> patch;
     std::vector<ScreenVertex> vertex;
-    size_t triangles = 0;
+    size_t triangles = 0, vertices = 0;  ///< of the patches
 };
 
 }  // namespace pietra

@@ -62,7 +62,8 @@ struct Span {
 template <class Real>
 void fillSpan(const Span& span, const Depths& depths, Real inv_area, uint32_t low) {
     int64_t e1 = span.e1, e2 = span.e2;
-    // note: differences in float would lose what is far away of a triangle with a corner at the eye.
+    // note: differences in float would lose what is far away of a triangle with a corner at the
+    // eye.
     const Real d0 = depths.d0, d1 = Real(depths.d1) - d0, d2 = Real(depths.d2) - d0;
     VisibilityKey* key = span.key;
     for (int64_t i = 0; i < span.count; ++i, key += span.stride) {

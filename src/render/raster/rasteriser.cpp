@@ -22,6 +22,8 @@ namespace {
 
 /// A larger mesh is drawn in several chunks.
 constexpr size_t kChunkTriangles = 4096;
+/// A batch takes vertices up to so many and one patch more: 16 MB.
+constexpr size_t kBatchVertices = size_t(1) << 20;
 /// More tiles than threads, so that none waits long for the last one.
 constexpr size_t kTilesPerThread = 8;
 
@@ -54,6 +56,7 @@ struct Rasteriser::State {
     Picture picture;
     Batch batch;
     std::vector<uint8_t> drawn;  // a patch of the batch: not left out, set by any thread
+    std::vector<uint32_t>* hidden = nullptr;  // takes the ids of those left out
     RasterStatistics statistics;
 
     State(const View& v, const Lattice& lattice, int sample_count, const ShadeSettings& s)
@@ -64,7 +67,7 @@ struct Rasteriser::State {
     PixelBox screen() const { return {0, 0, picture.size.width, picture.size.height}; }
     void checkScalars(const Mesh& mesh) const;
     void beginBatch();
-    void append(std::span<const DrawPatch> patches);
+    void draw(std::span<const DrawPatch> patches, bool leave_out_hidden);
     void drawBatch(bool leave_out_hidden);
     void layOutVertices();
     void transform(BatchPatch& patch) const;
@@ -100,29 +103,34 @@ void Rasteriser::State::beginBatch() {
     CHECK(!finished);
     batch.model.clear();
     batch.patch.clear();
-    batch.triangles = 0;
+    batch.triangles = batch.vertices = 0;
 }
 
-void Rasteriser::State::append(std::span<const DrawPatch> patches) {
+/// Adds patches of the model to the batch, and draws what is more than it should hold.
+void Rasteriser::State::draw(std::span<const DrawPatch> patches, bool leave_out_hidden) {
+    batch.model.push_back(model);
     for (const DrawPatch& patch : patches) {
+        if (batch.vertices > kBatchVertices) {
+            drawBatch(leave_out_hidden);
+            beginBatch();
+            batch.model.push_back(model);
+        }
         checkScalars(*patch.mesh);
         BatchPatch entry;
         entry.patch = &patch;
-        entry.model = uint32_t(batch.model.size());
+        entry.model = uint32_t(batch.model.size() - 1);
         entry.first_number = uint32_t(batch.triangles);
         entry.both_sides = settings.two_sided || !patch.one_sided;
         entry.colour = patchColour(settings, patch);
         batch.patch.push_back(entry);
         batch.triangles += patch.mesh->triangleCount();
+        batch.vertices += patch.mesh->vertexCount();
+        CHECK_LT(batch.triangles, size_t(kMaxTriangleNumber));
     }
-    batch.model.push_back(model);
-    CHECK_LT(batch.triangles, size_t(kMaxTriangleNumber));
 }
 
 void Rasteriser::State::layOutVertices() {
-    size_t vertices = 0;
-    for (const BatchPatch& patch : batch.patch) vertices += patch.mesh().vertexCount();
-    batch.vertex.resize(vertices);
+    batch.vertex.resize(batch.vertices);
     ScreenVertex* vertex = batch.vertex.data();
     for (BatchPatch& patch : batch.patch) {
         patch.vertex = vertex;
@@ -141,7 +149,11 @@ void Rasteriser::State::drawBatch(bool leave_out_hidden) {
     statistics.triangles += batch.triangles;
     statistics.patches += batch.patch.size();
     for (size_t i = 0; i < drawn.size(); ++i)
-        if (!drawn[i]) statistics.triangles_hidden += batch.patch[i].mesh().triangleCount();
+        if (!drawn[i]) {
+            statistics.triangles_hidden += batch.patch[i].mesh().triangleCount();
+            if (hidden != nullptr && !batch.patch[i].box.empty())
+                hidden->push_back(batch.patch[i].patch->id);
+        }
 }
 
 void Rasteriser::State::transform(BatchPatch& entry) const {
@@ -288,17 +300,20 @@ void Rasteriser::setModel(const View& view, const Lattice& lattice) {
 
 void Rasteriser::draw(std::span<const DrawPatch> patches) {
     state_->beginBatch();
-    state_->append(patches);
+    state_->draw(patches, false);
     state_->drawBatch(false);
 }
 
-void Rasteriser::draw(std::span<const ModelPatches> models, bool leave_out_hidden) {
+void Rasteriser::draw(std::span<const ModelPatches> models, bool leave_out_hidden,
+                      std::vector<uint32_t>* hidden) {
+    state_->hidden = hidden;
     state_->beginBatch();
     for (const ModelPatches& m : models) {
         setModel(m.view, *m.lattice);
-        state_->append(m.patches);
+        state_->draw(m.patches, leave_out_hidden);
     }
     state_->drawBatch(leave_out_hidden);
+    state_->hidden = nullptr;
 }
 
 const Picture& Rasteriser::finish() {

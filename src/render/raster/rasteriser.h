@@ -13,8 +13,8 @@
 // Determinism: the picture does not depend on the number of threads, the SIMD level, how the draw
 // list was cut into calls, or whether what is hidden was left out.
 //
-// Memory: 16 bytes a pixel (56 with 4 samples), and 16 a vertex of the largest draw().
-// Not thread-safe: one thread calls, many work.
+// Memory: 16 bytes a pixel (56 with 4 samples), and 16 a vertex of what is drawn at once: a
+// million, or those of the largest mesh. Not thread-safe: one thread calls, many work.
 
 #include <cstdint>
 #include <memory>
@@ -65,12 +65,13 @@ public:
     /// is the same camera and size in its coordinates.
     void setModel(const View& view, const Lattice& lattice);
     /// Draws, and shades what is visible so far: the meshes may vanish afterwards. At most 2^32 - 2
-    /// triangles a call.
+    /// triangles a mesh.
     void draw(std::span<const DrawPatch> patches);
     /// Draws the models as one after the other; the last one stays set. Patches that are hidden, by
     /// what is drawn already or by each other, may be left out: this changes no pixel, and costs
-    /// next to nothing where none are.
-    void draw(std::span<const ModelPatches> models, bool leave_out_hidden);
+    /// next to nothing where none are. Appends the ids of those left out to `hidden`.
+    void draw(std::span<const ModelPatches> models, bool leave_out_hidden,
+              std::vector<uint32_t>* hidden = nullptr);
     /// Completes the picture, which is valid until restart(); nothing can be drawn in between.
     const Picture& finish();
 

@@ -264,6 +264,26 @@ TEST(Picture, DoesNotDependOnHowTheListIsCutIntoCalls) {
     }
 }
 
+TEST(Picture, DoesNotDependOnHowManyBatchesAListTakes) {
+    const Scene scene;
+    const Picture expected = render(scene.view, scene.patches, 1);
+    size_t vertices = 0;
+    for (const Mesh& mesh : scene.meshes) vertices += mesh.vertexCount();
+    // Of equal depths the first wins: what comes again changes nothing.
+    std::vector<DrawPatch> again;
+    for (size_t held = 0; held < 2'500'000; held += vertices)
+        again.insert(again.end(), scene.patches.begin(), scene.patches.end());
+    const Lattice lattice;
+    const std::vector<ModelPatches> models = {{scene.view, &lattice, again},
+                                              {scene.view, &lattice, scene.patches}};
+    for (const bool leave_out_hidden : {false, true}) {
+        Rasteriser rasteriser(scene.view, lattice, 1, {});
+        rasteriser.draw(models, leave_out_hidden);
+        expectSame(rasteriser.finish(), expected, std::to_string(leave_out_hidden));
+        EXPECT_EQ(rasteriser.statistics().patches, again.size() + scene.patches.size());
+    }
+}
+
 TEST(Picture, IsTheSameWhereverOnEarthTheModelLies) {
     const Scene scene;
     const Camera camera{{500, -700, 900}, {520, 600, 300}, {0, 0, 1}, 60};

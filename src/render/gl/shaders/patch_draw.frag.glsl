@@ -28,8 +28,8 @@ layout(location = 0) out vec4 colour;
 #define AT_PLACE(value) interpolateAtOffset(value, place_offset)
 vec2 place_offset;
 void findPlace() {
-    const vec2 kSample[4] = vec2[4](vec2(-0.125, -0.375), vec2(0.375, -0.125),
-                                    vec2(-0.375, 0.125), vec2(0.125, 0.375));
+    const vec2 kSample[4] =
+        vec2[4](vec2(-0.125, -0.375), vec2(0.375, -0.125), vec2(-0.375, 0.125), vec2(0.125, 0.375));
     vec2 sum = vec2(0.0);
     for (int s = 0; s < 4; ++s)
         if ((gl_SampleMaskIn[0] >> s & 1) != 0) sum += kSample[s];
@@ -122,8 +122,9 @@ void main() {
 #ifdef WIRE
     // wireShade() of shading.h.
     float nearest = min(min(edge_distance.x, edge_distance.y), edge_distance.z);
-    float line = clamp(1.25 - abs(nearest), 0.0, 1.0);
-    base *= 1.0 - 0.8 * line * clamp((least_height - 2.0) / 6.0, 0.0, 1.0);
+    float line = clamp(WIRE_REACH - abs(nearest), 0.0, 1.0);
+    float visible = clamp((least_height - WIRE_LEAST_HEIGHT) / WIRE_FADE, 0.0, 1.0);
+    base *= 1.0 - WIRE_DARKNESS * line * visible;
 #endif
     colour = vec4(lit(n, eye, base), 1.0);
 #endif
