@@ -56,12 +56,13 @@ private:
     std::vector<Entry> entry_;
 };
 
-ModelInfo infoOf(const InputLeaves& input, const BuildSettings& settings,
-                 const BuildCounts& counts) {
+ModelInfo infoOf(const InputLeaves& input, const BuildSettings& settings, const BuildCounts& counts,
+                 bool normals_given) {
     const Lattice& lattice = input.vertices.lattice();
     ModelInfo info;
     info.method = "pmesh";
     info.lattice = lattice;
+    info.schema.normals_given = normals_given;
     info.input_triangles = input.inputTriangles();
     info.input_vertices = input.vertices.size();
     info.input_files = settings.input_files;
@@ -127,7 +128,8 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
     BuildReport report = reportOf(source, input, counts, forest.row.size());
     progress.beginStage("write", forest.row.size());
     pages.write(writer, progress);
-    writer.finish(infoOf(input, settings, counts), {}, encodeBase(forest));
+    writer.finish(infoOf(input, settings, counts, source.schema().normals_given), {},
+                  encodeBase(forest));
     progress.endStage();
     report.output_bytes = std::filesystem::file_size(settings.output);
     report.temp_bytes_peak = space.peak_bytes;
