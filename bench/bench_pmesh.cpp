@@ -15,6 +15,7 @@
 #include "base/parallel.h"
 #include "methods/pmesh/adaption.h"
 #include "methods/pmesh/in_core_builder.h"
+#include "methods/pmesh/node_codec.h"
 #include "methods/pmesh/whole_mesh.h"
 
 namespace {
@@ -29,13 +30,16 @@ double now() {
     return double(t.tv_sec) + double(t.tv_nsec) * 1e-9;
 }
 
-void report(const ProgressiveMesh& mesh, const BuildCounts& counts, double seconds) {
+void report(const NodeForest& mesh, const BuildCounts& counts, double seconds) {
     std::printf(
         "  built in %.2f s: base %zu vertices, %zu triangles; %zu operations, %llu dummies;"
         " %u levels; %llu irregular vertices\n",
-        seconds, mesh.base_vertex.size(), mesh.base_triangle.size(), mesh.operation.size(),
+        seconds, mesh.base_vertex.size(), mesh.base_triangle.size(), size_t(counts.operations),
         static_cast<unsigned long long>(counts.dummies), counts.levels,
         static_cast<unsigned long long>(counts.irregular_vertices));
+    std::printf("  %zu nodes, %.1f %% full, %u levels of them\n", mesh.row.size(),
+                100.0 * double(counts.operations) / double(mesh.row.size() * kNodeSlots),
+                mesh.row.empty() ? 0 : mesh.row.back().level + 1u);
     std::printf(
         "  refused by valence %llu, by level %llu; %llu ends inexact, by %u steps at most;"
         " resident %zu MiB\n",
@@ -43,6 +47,24 @@ void report(const ProgressiveMesh& mesh, const BuildCounts& counts, double secon
         static_cast<unsigned long long>(counts.refused.level),
         static_cast<unsigned long long>(counts.inexact_ends), counts.largest_error,
         peakResidentBytes() >> 20);
+}
+
+void reportPages(const NodeForest& forest, const BuildCounts& counts) {
+    std::vector<std::vector<std::byte>> pages;
+    size_t bytes = encodeBase(forest).size();
+    const double begin = now();
+    for (const OperationNode& node : forest.node)
+        bytes += pages.emplace_back(encodeNode(node)).size();
+    const double encoded = now();
+    OperationNode node;
+    std::string fault;
+    for (NodeIndex n = 0; n < pages.size(); ++n)
+        if (!decodeNode(pages[n], n, forest.row[n], node, fault))
+            std::printf("%s\n", fault.c_str());
+    const double rate = 1e-6 * double(counts.operations);
+    std::printf("  pages: %.2f bytes an operation; %.2f M operations/s encoded, %.2f decoded\n",
+                double(bytes) / double(counts.operations), rate / (encoded - begin),
+                rate / (now() - encoded));
 }
 
 /// Passes to the end; operations a second.
@@ -119,8 +141,10 @@ void run(const char* path, int jobs) {
     for (const Vec3i& p : whole.mesh.position) box.add(whole.lattice.toInput(p));
     BuildCounts counts;
     const double begin = now();
-    const ProgressiveMesh mesh = buildInCore(std::move(whole.mesh), whole.lattice, budget, &counts);
-    report(mesh, counts, now() - begin);
+    const NodeForest forest = buildInCore(std::move(whole.mesh), whole.lattice, budget, &counts);
+    const ProgressiveMesh mesh = fromNodes(forest);
+    report(forest, counts, now() - begin);
+    reportPages(forest, counts);
     Adaption adaption(mesh);
     for (int i = 0; i < 2; ++i) {
         settle("refine all", adaption, criterionOf(-1.0, mesh.lattice));

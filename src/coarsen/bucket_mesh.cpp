@@ -43,7 +43,7 @@ public:
     Welder(const Partition& partition, size_t bucket, const VertexRecord& record)
         : partition_(partition), bucket_(partition.buckets()[bucket]), record_(record) {}
 
-    WeldedBucket run(uint32_t leaf_triangles) {
+    WeldedBucket run(uint32_t leaf_triangles, bool mark_irregular) {
         weldOwn();
         weldGhosts();
         dropDuplicates();
@@ -51,6 +51,7 @@ public:
         locateVertices();
         if (!record_.normals) sumNormals();
         classifyEdges();
+        if (mark_irregular) markIrregular();
         trim();
         return std::move(out_);
     }
@@ -267,8 +268,8 @@ private:
         }
         for (uint32_t t = 0; t < mesh().triangle.size(); ++t) {
             const Triangle& f = mesh().triangle[t];
-            components.setVolume(
-                t, sixfoldVolume(position_[f[0]], position_[f[1]], position_[f[2]]));
+            components.setVolume(t,
+                                 sixfoldVolume(position_[f[0]], position_[f[1]], position_[f[2]]));
         }
         out_.bucket.components = components.finish();
     }
@@ -312,6 +313,88 @@ private:
         }
     }
 
+    /// The corner of a triangle at a vertex, by the others.
+    struct Corner {
+        uint32_t next, previous, triangle;
+        uint8_t edge;  ///< from the vertex to `next`
+    };
+
+    // Vertices inside see all their triangles.
+    void markIrregular() {
+        std::vector<uint32_t> start(keys_.size() + 1, 0);
+        for (size_t t = 0; t < triangleTotal(); ++t)
+            for (const uint32_t v : triangleAt(t)) ++start[v + 1];
+        for (size_t v = 0; v < keys_.size(); ++v) start[v + 1] += start[v];
+        std::vector<Corner> corners(3 * triangleTotal());
+        std::vector<uint32_t> next(start.begin(), start.end() - 1);
+        for (uint32_t t = 0; t < triangleTotal(); ++t) {
+            const Triangle& f = triangleAt(t);
+            for (uint8_t k = 0; k < 3; ++k)
+                corners[next[f[k]]++] = {f[(k + 1) % 3], f[(k + 2) % 3], t, k};
+        }
+        for (uint32_t v = 0; v < keys_.size(); ++v) {
+            const std::span<Corner> fan(corners.data() + start[v], start[v + 1] - start[v]);
+            if (inside_[v] && !isOneFan(fan)) markFans(v, fan);
+        }
+    }
+
+    static bool isOneFan(std::span<const Corner> corners) {
+        const auto count = [&](uint32_t w, uint32_t Corner::*side) {
+            return std::count_if(corners.begin(), corners.end(),
+                                 [&](const Corner& c) { return c.*side == w; });
+        };
+        size_t first = 0, open = 0;
+        for (size_t i = 0; i < corners.size(); ++i) {
+            if (count(corners[i].next, &Corner::next) > 1 ||
+                count(corners[i].previous, &Corner::previous) > 1)
+                return false;
+            if (count(corners[i].next, &Corner::previous) == 0) first = i, ++open;
+        }
+        if (open > 1) return false;
+        size_t reached = 1;
+        for (uint32_t w = corners[first].previous; reached < corners.size(); ++reached) {
+            const auto c = std::find_if(corners.begin(), corners.end(),
+                                        [&](const Corner& c) { return c.next == w; });
+            if (c == corners.end() || size_t(c - corners.begin()) == first) break;
+            w = c->previous;
+        }
+        return reached == corners.size();
+    }
+
+    // Triangles that share a neighbour count as one fan here; each of them has an edge marked.
+    void markFans(uint32_t v, std::span<Corner> corners) {
+        std::sort(corners.begin(), corners.end(),
+                  [&](const Corner& a, const Corner& b) { return keys_[a.next] < keys_[b.next]; });
+        std::vector<uint8_t> reached(corners.size(), 0);
+        for (size_t i = 0; i < corners.size(); ++i) {
+            if (reached[i]) continue;
+            const uint32_t w = corners[i].next;
+            for (const Corner& c : corners) {
+                if (c.next == w) setClass(v, w, c.triangle, c.edge);
+                if (c.previous == w) setClass(v, w, c.triangle, uint8_t((c.edge + 2) % 3));
+            }
+            std::vector<uint32_t> joined{w};
+            for (size_t k = 0; k < joined.size(); ++k)
+                for (size_t j = 0; j < corners.size(); ++j) {
+                    const Corner& c = corners[j];
+                    if (reached[j] || (c.next != joined[k] && c.previous != joined[k])) continue;
+                    reached[j] = 1;
+                    joined.push_back(c.next);
+                    joined.push_back(c.previous);
+                }
+        }
+    }
+
+    void setClass(uint32_t v, uint32_t w, uint32_t triangle, uint8_t edge) {
+        if (triangle < mesh().triangle.size()) {
+            mesh().edge_class[triangle] |= uint8_t(uint8_t(EdgeClass::kMany) << (2 * edge));
+            return;
+        }
+        const auto [low, high] = std::minmax(keys_[v], keys_[w]);
+        out_.messages.push_back(
+            {homeOf(triangleAt(triangle)), {low, high, uint32_t(EdgeClass::kMany)}});
+    }
+
     // Duplicates and ghosts may have left vertices that no own triangle uses; ghosts' come last,
     // and duplicates share all of theirs with the one that stays.
     void trim() {
@@ -337,8 +420,8 @@ private:
 }  // namespace
 
 WeldedBucket weldBucket(const Partition& partition, size_t bucket, const VertexRecord& record,
-                        uint32_t leaf_triangles) {
-    return Welder(partition, bucket, record).run(leaf_triangles);
+                        uint32_t leaf_triangles, bool mark_irregular) {
+    return Welder(partition, bucket, record).run(leaf_triangles, mark_irregular);
 }
 
 void applyMessages(std::span<const Message> messages, BucketMesh& bucket) {
@@ -382,12 +465,14 @@ void applyMessages(std::span<const Message> messages, BucketMesh& bucket) {
         for (size_t e = 0; e < 3; ++e) {
             const uint32_t a = mesh.triangle[t][e], b = mesh.triangle[t][(e + 1) % 3];
             if (!touched[a] || !touched[b]) continue;
-            const auto found = std::lower_bound(edges.begin(), edges.end(),
-                                                Edge{std::min(a, b), std::max(a, b), 0});
-            if (found == edges.end() || found->a != std::min(a, b) || found->b != std::max(a, b))
-                continue;
-            mesh.edge_class[t] =
-                uint8_t((mesh.edge_class[t] & ~(3u << (2 * e))) | found->value << (2 * e));
+            // The largest that was told, of here and there: kMany may come beside what is owned.
+            auto found = std::upper_bound(edges.begin(), edges.end(),
+                                          Edge{std::min(a, b), std::max(a, b), ~0u});
+            if (found == edges.begin()) continue;
+            if (--found; found->a != std::min(a, b) || found->b != std::max(a, b)) continue;
+            const uint32_t here = mesh.edge_class[t] >> (2 * e) & 3u;
+            mesh.edge_class[t] = uint8_t((mesh.edge_class[t] & ~(3u << (2 * e))) |
+                                         std::max(here, found->value) << (2 * e));
         }
 }
 

@@ -59,8 +59,11 @@ struct WeldedBucket {
     EdgeCounts edges;                                  ///< of the edges that this bucket owns
 };
 
+/// `mark_irregular`: for each fan at a vertex where triangles do not form one fan (a run joined by
+/// edges that two triangles use, in opposite directions), one edge there is of class kMany. So no
+/// collapse moves such a vertex, wherever its other fans are.
 WeldedBucket weldBucket(const Partition& partition, size_t bucket, const VertexRecord& record,
-                        uint32_t leaf_triangles);
+                        uint32_t leaf_triangles, bool mark_irregular = false);
 
 /// Sets normals and edge classes that other buckets know better.
 void applyMessages(std::span<const Message> messages, BucketMesh& bucket);

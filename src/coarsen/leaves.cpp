@@ -171,7 +171,8 @@ Leaves buildLeaves(Partition& partition, const VertexRecord& record, const LeafS
 
     progress.beginStage("weld", partition.triangleCount());
     parallelFor(buckets.size(), [&](size_t b) {
-        WeldedBucket welded = weldBucket(partition, b, record, settings.leaf_triangles);
+        WeldedBucket welded =
+            weldBucket(partition, b, record, settings.leaf_triangles, settings.mark_irregular);
         {
             const std::lock_guard lock(mutex);
             cells.insert(cells.end(), welded.leaves.begin(), welded.leaves.end());

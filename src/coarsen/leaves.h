@@ -18,6 +18,7 @@ struct LeafSettings {
     uint32_t leaf_triangles = 4000;
     float bound = 0;  ///< quantisation error: the bounds of every leaf face, lattice units
     size_t component_bytes = 1 << 20;  ///< memory for joining components, at least this
+    bool mark_irregular = false;       ///< as weldBucket() says
 };
 
 struct Leaves {

@@ -2,6 +2,7 @@
 // Meshes for the tests and benchmarks of this folder: synthetic shapes, real scans where the shared
 // data is there, and pieces cut from them the way diamonds are.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>

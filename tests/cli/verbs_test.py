@@ -189,6 +189,22 @@ class Shown(VerbTest):
                          self.report("info", "statue.pietra", "--json")["input"]["triangles"])
         self.assertGreater(report["max_error"], 0)
 
+    def test_a_progressive_mesh_is_built_checked_and_extracted(self):
+        self.report("build", "statue.ply", "-o", "fine.pietra", "--method", "pmesh", "--report", "-")
+        info = self.report("info", "fine.pietra", "--json")
+        self.assertEqual(info["method"], "pmesh")
+        self.assertTrue(self.report("check", "fine.pietra", "--input", "statue.ply", "--json")["ok"])
+        full = self.extract("fine", "--full")
+        self.assertEqual(len(full[2]), info["input"]["triangles"])
+        few = self.extract("fine", "--triangles", "1000")
+        self.assertTrue(900 < len(few[2]) <= 1000)
+        coarse = self.extract("fine", "--error", str(info["max_error"] / 20))
+        for names, vertices, triangles in (full, few, coarse):
+            self.assertEqual(set(edge_uses(triangles)), {2})
+        run = self.run_pietra("render", "fine.pietra", "-o", "x.png")
+        self.assertEqual(run.returncode, 3)
+        self.assertIn("models of the method pmesh cannot be drawn yet", run.stderr)
+
     def render(self, name, *arguments, models=("statue.pietra",)):
         return self.report("render", *models, "-o", name, "--size", "200x160", "--report", "-",
                            *arguments)

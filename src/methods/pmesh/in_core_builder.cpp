@@ -1,11 +1,8 @@
 #include "methods/pmesh/in_core_builder.h"
 
 #include <algorithm>
-#include <cmath>
-#include <numeric>
 
-#include "base/check.h"
-#include "methods/pmesh/active_mesh.h"
+#include "methods/pmesh/twins.h"
 #include "simplify/simplify.h"
 
 namespace pietra::pmesh {
@@ -38,204 +35,35 @@ SimplifyOutput collapseAll(const Mesh& mesh, int shift, Recorder& recorder) {
     return output;
 }
 
-/// Integer, rounded up.
-uint32_t lengthOf(const Vec3i& v) {
-    const Vec3d d(v);
-    return uint32_t(std::ceil(std::sqrt(glm::dot(d, d))));
-}
-
-/// Of an error in steps.
-uint8_t errorCode(double error) {
-    const uint64_t units = std::max<uint64_t>(uint64_t(std::ceil(error / kErrorUnit)), 1);
-    return uint8_t(std::min(encodeRoundedUp<3>(units), kMaxErrorCode));
-}
-
-class Encoder {
-public:
-    Encoder(const Recorder& recorder, const SimplifyOutput& base, const Lattice& lattice,
-            size_t input_vertices, ProgressiveMesh& mesh, BuildCounts& counts)
-        : recorder_(recorder),
-          base_(base),
-          shift_(lattice.shift),
-          slot_of_(input_vertices, kNoVertex),
-          mesh_(mesh),
-          counts_(counts) {
-        mesh_.lattice = lattice;
+void takeCollapses(Recorder& recorder, const SimplifyOutput& simplified, Collapses& out) {
+    out.vertices = simplified.vertex_map.size();
+    out.largest_height = recorder.largestHeight();
+    out.dummies = recorder.dummies();
+    out.refused = recorder.refused();
+    std::vector<uint8_t> gone(out.vertices, 0);
+    for (size_t i = 0; i < recorder.records().size(); ++i) {
+        const CollapseLink& link = recorder.links()[i];
+        if (link.u != kNoVertex) gone[link.u] = 1;
+        out.store.append(link, recorder.records()[i]);
     }
-
-    void run() {
-        makeBase();
-        orderOperations();
-        encodeStars();
-        saturate();
-    }
-
-private:
-    void makeBase();
-    void orderOperations();
-    void encodeStars();
-    void encode(ActiveMesh& active, OperationId id, const CollapseRecord& r);
-    void encodeDummy(ActiveMesh& active, OperationId id, const CollapseRecord& r);
-    void setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& from);
-    void saturate();
-
-    const Recorder& recorder_;
-    const SimplifyOutput& base_;
-    int shift_;
-    std::vector<uint32_t> order_;    // operations' records
-    std::vector<uint32_t> slot_of_;  // input vertices in the active mesh
-    ProgressiveMesh& mesh_;
-    BuildCounts& counts_;
-};
-
-void Encoder::makeBase() {
-    const Mesh& base = base_.mesh;
-    mesh_.base_vertex.resize(base.vertexCount());
-    mesh_.base_triangle = base.triangle;
-    for (const CollapseRecord& r : recorder_.records())
-        if (r.u != kNoVertex) slot_of_[r.u] = 0;  // gone
-    for (uint32_t v = 0; v < slot_of_.size(); ++v) {
-        const uint32_t slot = slot_of_[v] == 0 ? kNoVertex : base_.vertex_map[v];
-        slot_of_[v] = slot;
-        if (slot == kNoVertex) continue;
-        const Vec3i p = base.position[slot] >> shift_;
-        mesh_.base_vertex[slot] = {p.x, p.y, p.z, packNormal(recorder_.normalOf(v))};
-    }
-}
-
-/// Coarse to fine; within a level the last to collapse first.
-void Encoder::orderOperations() {
-    const std::vector<CollapseRecord>& records = recorder_.records();
-    order_.resize(records.size());
-    std::iota(order_.rbegin(), order_.rend(), 0u);
-    std::stable_sort(order_.begin(), order_.end(),
-                     [&](uint32_t a, uint32_t b) { return records[a].height > records[b].height; });
-    std::vector<OperationId> id_of(records.size());
-    for (OperationId id = 0; id < order_.size(); ++id) id_of[order_[id]] = id;
-    const auto idOf = [&](uint32_t record) {
-        return record == kNoOperation ? record : id_of[record];
-    };
-    mesh_.operation.resize(records.size());
-    for (OperationId id = 0; id < order_.size(); ++id) {
-        const CollapseRecord& r = records[order_[id]];
-        Operation& o = mesh_.operation[id];
-        o.child = {idOf(r.child[0]), idOf(r.child[1])};
-        o.level = uint16_t(recorder_.largestHeight() - r.height);
-        o.normal = r.normal;
-        o.radius = o.error = 0;
-        o.ranks = r.u == kNoVertex ? Operation::kDummyRanks : uint8_t(0);
-    }
-    for (OperationId id = 0; id < order_.size(); ++id)
-        for (const int end : {0, 1}) {
-            const OperationId child = mesh_.operation[id].childOf(end);
-            if (child != kNoOperation && mesh_.operation[child].isDummy())
-                mesh_.operation[child].child[1] = id;
-        }
-    mesh_.base_operation.assign(mesh_.base_vertex.size(), kNoOperation);
-    for (uint32_t v = 0; v < slot_of_.size(); ++v)
-        if (slot_of_[v] != kNoVertex) mesh_.base_operation[slot_of_[v]] = idOf(recorder_.lastOf(v));
-}
-
-void Encoder::encodeStars() {
-    ActiveMesh active(mesh_);
-    const size_t count = mesh_.operation.size();
-    active.resize(active.vertexCount() + count, active.faceCount() + 2 * count);
-    active.resize(mesh_.base_vertex.size(), mesh_.base_triangle.size());
-    for (OperationId id = 0; id < count; ++id) {
-        const CollapseRecord& r = recorder_.records()[order_[id]];
-        CHECK_EQ(active.record[slot_of_[r.v]].next, id);
-        if (r.u == kNoVertex) {
-            encodeDummy(active, id, r);
-        } else {
-            encode(active, id, r);
-        }
-    }
-    counts_.name_of = slot_of_;
-    for (uint32_t& name : counts_.name_of)
-        if (name != kNoVertex) name = active.record[name].name;
-}
-
-/// Moves v to where it is to be, as far as sixteen bits reach.
-void Encoder::encodeDummy(ActiveMesh& active, OperationId id, const CollapseRecord& r) {
-    Operation& o = mesh_.operation[id];
-    const uint32_t v = slot_of_[r.v];
-    const Vec3i offset = glm::clamp(r.position[0] - active.vertex[v].position(), -32768, 32767);
-    o.shift = 0;
-    for (int k = 0; k < 3; ++k) {
-        o.delta[0][size_t(k)] = int8_t(offset[k] >> 8);
-        o.delta[1][size_t(k)] = int8_t(offset[k] & 0xff);
-    }
-    o.radius = uint16_t(encodeRoundedUp<11>(lengthOf(offset)));
-    o.error = errorCode(lengthOf(offset));
-    active.move(v);
-}
-
-void Encoder::encode(ActiveMesh& active, OperationId id, const CollapseRecord& r) {
-    Operation& o = mesh_.operation[id];
-    const uint32_t v = slot_of_[r.v], u = uint32_t(active.vertexCount());
-    Star star;
-    active.gatherStars(std::span(&v, 1), &star, [](uint32_t) {});
-    CHECK(active.orient(star));
-    uint32_t left = kNoRank, right = kNoRank, radius = 0;
-    const Vec3i from = active.vertex[v].position();
-    for (uint32_t rank = 0; rank < star.neighbours(); ++rank) {
-        const uint32_t w = active.neighbour(star, rank);
-        if (r.left != kNoVertex && w == slot_of_[r.left]) left = rank;
-        if (r.right != kNoVertex && w == slot_of_[r.right]) right = rank;
-        radius = std::max(radius, lengthOf(active.vertex[w].position() - from));
-    }
-    CHECK_EQ(left == kNoRank, r.left == kNoVertex);
-    CHECK_EQ(right == kNoRank, r.right == kNoVertex);
-    o.ranks = uint8_t(left | right << 4);
-    setOffsets(o, r, from);
-    radius = std::max({radius, lengthOf(o.offset(0)), lengthOf(o.offset(1))});
-    o.radius = uint16_t(encodeRoundedUp<11>(radius));
-    o.error = errorCode(double(r.deviation) / double(1 << shift_));
-    const uint32_t face = uint32_t(active.faceCount());
-    active.resize(u + 1, face + (left != kNoRank) + (right != kNoRank));
-    active.split(v, star, u, face);
-    slot_of_[r.u] = u;
-}
-
-void Encoder::setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& from) {
-    const std::array<Vec3i, 2> offset{r.position[0] - from, r.position[1] - from};
-    const QuantisedOffsets q = quantiseOffsets(offset);
-    o.shift = q.shift;
-    o.delta = q.delta;
-    for (const int end : {0, 1}) {
-        const Vec3i rest = glm::abs(o.offset(end) - offset[size_t(end)]);
-        const uint32_t largest = uint32_t(std::max({rest.x, rest.y, rest.z}));
-        counts_.inexact_ends += largest != 0;
-        counts_.largest_error = std::max(counts_.largest_error, largest);
-    }
-}
-
-/// From the fine side up: no operation states less than those below it.
-void Encoder::saturate() {
-    for (size_t i = mesh_.operation.size(); i-- > 0;) {
-        Operation& o = mesh_.operation[i];
-        uint32_t radius = decodeRadius(o.radius);
-        for (const int end : {0, 1}) {
-            if (o.childOf(end) == kNoOperation) continue;
-            const Operation& child = mesh_.operation[o.childOf(end)];
-            o.error = std::max(o.error, child.error);
-            radius = std::max(radius, lengthOf(o.offset(end)) + decodeRadius(child.radius));
-        }
-        const uint32_t code = encodeRoundedUp<11>(radius);
-        CHECK_LE(code, kMaxRadiusCode);
-        o.radius = uint16_t(code);
+    out.base = simplified.mesh;
+    out.base_vertex.assign(out.base.vertexCount(), kNoVertex);
+    for (uint32_t v = 0; v < out.vertices; ++v)
+        if (!gone[v] && simplified.vertex_map[v] != kNone)
+            out.base_vertex[simplified.vertex_map[v]] = v;
+    for (uint32_t slot = 0; slot < out.base.vertexCount(); ++slot) {
+        out.base.normal[slot] = recorder.normalOf(out.base_vertex[slot]);
+        out.base_last.push_back(recorder.historyOf(out.base_vertex[slot]).last);
     }
 }
 
 }  // namespace
 
-ProgressiveMesh buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
-                            BuildCounts* counts) {
+NodeForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget, BuildCounts* counts) {
     const Reservation memory =
         budget.reserve(kBuildBytes * mesh.triangleCount(), "a progressive mesh, built in memory,");
     BuildCounts unused;
     BuildCounts& c = counts ? *counts : unused;
-    ProgressiveMesh result;
     std::vector<uint8_t> irregular;
     {
         HalfEdges edges = findHalfEdges(mesh.triangle, mesh.vertexCount());
@@ -245,11 +73,17 @@ ProgressiveMesh buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
     c.irregular_vertices = uint64_t(std::count(irregular.begin(), irregular.end(), 1));
     Recorder recorder(mesh, irregular, lattice.shift);
     const SimplifyOutput base = collapseAll(mesh, lattice.shift, recorder);
-    c.refused = recorder.refused();
-    c.levels = recorder.largestHeight();
-    c.dummies = recorder.dummies();
-    Encoder(recorder, base, lattice, mesh.vertexCount(), result, c).run();
-    return result;
+    TempSpace space{"", &budget, 0};
+    Collapses collapses(space);
+    takeCollapses(recorder, base, collapses);
+    std::vector<OperationNode> nodes;
+    NodeForest forest =
+        encode(collapses, lattice, space, c, [&](NodeIndex n, const NodeRow&, OperationNode& node) {
+            nodes.resize(std::max<size_t>(nodes.size(), n + 1));
+            nodes[n] = std::move(node);
+        });
+    forest.node = std::move(nodes);
+    return forest;
 }
 
 }  // namespace pietra::pmesh

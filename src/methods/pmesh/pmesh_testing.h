@@ -68,6 +68,7 @@ inline std::vector<TestMesh> testMeshes() {
 struct Built {
     Mesh input;
     BuildCounts counts;
+    NodeForest forest;
     ProgressiveMesh mesh;
 };
 
@@ -75,7 +76,8 @@ inline Built buildFor(const Mesh& input) {
     Built built;
     built.input = input;
     Budget budget(size_t(1) << 30);
-    built.mesh = buildInCore(input, Lattice{}, budget, &built.counts);
+    built.forest = buildInCore(input, Lattice{}, budget, &built.counts);
+    built.mesh = fromNodes(built.forest);
     return built;
 }
 

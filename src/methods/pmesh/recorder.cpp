@@ -33,7 +33,17 @@ Recorder::Recorder(const Mesh& mesh, std::span<const uint8_t> irregular, int shi
     : irregular_(irregular),
       shift_(shift),
       normal_(mesh.normal),
-      last_(mesh.vertexCount(), kNoOperation) {}
+      history_(mesh.vertexCount()),
+      error_before_(mesh.vertexCount(), 0) {}
+
+Recorder::Recorder(const Mesh& mesh, std::vector<VertexHistory> history, uint32_t first_record,
+                   int shift)
+    : shift_(shift),
+      normal_(mesh.normal),
+      history_(std::move(history)),
+      first_record_(first_record) {
+    for (const VertexHistory& h : history_) error_before_.push_back(h.error);
+}
 
 Vec3i Recorder::stepsOf(const WorkingMesh& mesh, const Vec3f& p) const {
     return (mesh.centre + Vec3i(p)) >> shift_;
@@ -67,33 +77,69 @@ float Recorder::precisionAt(const CollapseStep& step, uint32_t end) const {
     return kMostImprecise * std::sqrt(shortest_sq);
 }
 
-void Recorder::push(const CollapseRecord& record) {
-    largest_ = std::max(largest_, record.height);
-    last_[record.v] = uint32_t(record_.size());
+/// Adds what hangs below to the link, and makes it v's last.
+void Recorder::push(uint32_t v, CollapseLink link, CollapseRecord record) {
+    link.box.add(record.position[0]);
+    if (link.u != kNoVertex) link.box.add(record.position[1]);
+    VertexHistory& h = history_[v];
+    const auto addBelow = [&](const VertexHistory& below) {
+        link.box.add(below.box);
+        link.error = std::max(link.error, below.error);
+        link.operations += below.operations;
+    };
+    addBelow(h);
+    if (link.u != kNoVertex) addBelow(history_[link.u]);
+    record.error = link.error;
+    largest_ = std::max(largest_, uint32_t(record.height));
+    h = {first_record_ + uint32_t(record_.size()), record.height, link.operations, link.error,
+         link.box};
+    link_.push_back(link);
     record_.push_back(record);
 }
 
 void Recorder::recordDummy(const CollapseStep& step, uint32_t end) {
-    CollapseRecord r;
-    r.v = end;
+    CollapseRecord r{};
     r.position[0] = stepsOf(step.mesh, step.mesh.point[end].vec());
     r.normal[0] = packNormal(normal_[end]);
-    r.child = {last_[end], kNoOperation};
-    r.height = 0;
+    uint32_t height = 0;
     forEdges(step, [&](uint32_t a, uint32_t b) {
-        if (a == end || b == end) r.height = std::max({r.height, heightOf(a), heightOf(b)});
+        if (a == end || b == end) height = std::max({height, heightOf(a), heightOf(b)});
     });
-    ++r.height;
-    r.deviation = 0;
+    r.height = uint16_t(height + 1);
     ++dummies_;
-    push(r);
+    push(end, {.child = {history_[end].last, kNoOperation}, .box = {}}, r);
+}
+
+/// The triangles that remain, one after the other around the merged vertex.
+void Recorder::gatherRing(const CollapseStep& step, CollapseRecord& r) const {
+    const Ring& ring = step.ring;
+    const auto find = [&](const auto& of, uint32_t w) {
+        uint32_t i = 0;
+        while (i < ring.size && of[i] != w) ++i;
+        return i;
+    };
+    uint32_t first = 0;
+    while (first < ring.size && find(ring.previous, ring.next[first]) < ring.size) ++first;
+    r.closed = first == ring.size;
+    if (r.closed) first = 0;
+    r.ring[r.ring_size++] = ring.next[first];
+    uint32_t i = first;
+    for (uint32_t n = 1; n < ring.size; ++n) {
+        r.ring[r.ring_size++] = ring.previous[i];
+        i = find(ring.next, ring.previous[i]);
+        CHECK_LT(i, ring.size);
+    }
+    if (!r.closed) r.ring[r.ring_size++] = ring.previous[i];
 }
 
 bool Recorder::take(const CollapseStep& step) {
     const uint32_t u = step.u, v = step.v;
-    if (irregular_[u] || irregular_[v]) return ++refused_.irregular, false;
-    const bool open =
-        step.mesh.point[u].rank() != kRankFree || step.mesh.point[v].rank() != kRankFree;
+    for (size_t w = inside_.size(); w < history_.size(); ++w)
+        inside_.push_back(step.mesh.point[w].rank() != kRankFixed);
+    const uint32_t rank = std::max(step.mesh.point[u].rank(), step.mesh.point[v].rank());
+    if (rank == kRankFixed || (!irregular_.empty() && (irregular_[u] || irregular_[v])))
+        return ++refused_.irregular, false;
+    const bool open = rank != kRankFree;
     if (step.ring.size + open > kMaxNeighbours) return ++refused_.valence, false;
     CHECK_EQ(step.wing.size() + (open && step.wing.size() == 1), size_t(2));
     uint32_t highest = 0;
@@ -102,26 +148,32 @@ bool Recorder::take(const CollapseStep& step) {
     });
     if (highest + 3 > kMaxLevel + 1) return ++refused_.level, false;  // two dummies and itself
 
-    CollapseRecord r;
-    r.v = v, r.u = u;
+    CollapseRecord r{};
+    gatherRing(step, r);
     for (const Wing& w : step.wing) {
         const Face& face = step.mesh.face[w.face];
         const uint32_t k = face.v[0] == v ? 0 : face.v[1] == v ? 1 : 2;
-        (face.v[kNextCorner[k]] == u ? r.left : r.right) = w.vertex;
+        uint8_t rank = 0;
+        while (rank < r.ring_size && r.ring[rank] != w.vertex) ++rank;
+        CHECK_LT(rank, r.ring_size);
+        (face.v[kNextCorner[k]] == u ? r.left : r.right) = rank;
     }
     const Vec3i to = stepsOf(step.mesh, step.to);
     r.position = {stepsOf(step.mesh, step.mesh.point[v].vec()),
                   stepsOf(step.mesh, step.mesh.point[u].vec())};
+    for (uint32_t i = 0; i < r.ring_size; ++i) {
+        const Vec3d d(stepsOf(step.mesh, step.mesh.point[r.ring[i]].vec()) - to);
+        r.radius = std::max(r.radius, uint32_t(std::ceil(std::sqrt(glm::dot(d, d)))));
+    }
     const uint32_t shift = quantiseOffsets({r.position[0] - to, r.position[1] - to}).shift;
     const float lost = shift == 0 ? 0 : float(1 << (shift - 1)) * float(1 << shift_);
     for (const uint32_t end : {v, u})
         if (lost > 0 && lost > precisionAt(step, end)) recordDummy(step, end);
-    r.height = 1 + std::max({highest, heightOf(u), heightOf(v)});
+    r.height = uint16_t(1 + std::max({highest, heightOf(u), heightOf(v)}));
     r.normal = {packNormal(normal_[v]), packNormal(normal_[u])};
-    r.child = {last_[v], last_[u]};
-    r.deviation = step.deviation;
+    error_before_[v] = std::max(error_before_[v], error_before_[u]);
     normal_[v] = encodeNormal(decodeNormal(normal_[v]) + decodeNormal(normal_[u]));
-    push(r);
+    push(v, {{history_[v].last, history_[u].last}, u, 1, step.deviation + error_before_[v], {}}, r);
     return true;
 }
 

@@ -14,6 +14,8 @@
 #include <span>
 #include <vector>
 
+#include "extmem/spill.h"
+#include "geometry/bounds.h"
 #include "methods/pmesh/operations.h"
 #include "simplify/collapse_sink.h"
 
@@ -21,16 +23,52 @@ namespace pietra::pmesh {
 
 inline constexpr uint32_t kNoVertex = ~0u;
 
-/// A dummy has no u, left and right. Vertices are those of the mesh that is simplified; positions
-/// in steps.
+/// A collapse, as packing into nodes sees it. A dummy has no u.
+struct CollapseLink {
+    std::array<uint32_t, 2> child;  ///< the records that v and u came from, or kNoOperation
+    uint32_t u = kNoVertex;         ///< a vertex
+    uint32_t operations = 1;        ///< it and all below
+    float error = 0;                ///< lattice units, an estimate; no less than those below
+    Box3i box;                      ///< of where it and all below bring vertices, in steps
+};
+
+/// The rest, as encoding sees it. Positions in steps, and as they were before the collapse.
 struct CollapseRecord {
-    uint32_t v, u = kNoVertex;
-    uint32_t left = kNoVertex, right = kNoVertex;
-    std::array<Vec3i, 2> position;   ///< of v and of u, before
-    std::array<uint16_t, 2> normal;  ///< the same
-    std::array<uint32_t, 2> child;   ///< the records that v and u came from, or kNoOperation
-    uint32_t height;                 ///< from 1
-    float deviation;                 ///< lattice units, an estimate: Collapser::deviation()
+    std::array<Vec3i, 2> position;            ///< of v and of u
+    std::array<uint16_t, 2> normal;           ///< the same
+    float error;                              ///< as in the link
+    uint32_t radius = 0;                      ///< from the merged vertex to the farthest touched
+    uint16_t height;                          ///< from 1
+    uint8_t left = kNoRank, right = kNoRank;  ///< of vl and vr, in the ring
+    uint8_t ring_size = 0;                    ///< 0: a dummy
+    bool closed = false;
+    /// The neighbours of the merged vertex, counter-clockwise; where it is open, from the
+    /// beginning.
+    std::array<uint32_t, kMaxNeighbours> ring;
+};
+
+/// Collapses of a whole model, in temporary space.
+class CollapseStore {
+public:
+    explicit CollapseStore(TempSpace& space) : links_(space), records_(space) {}
+    void append(const CollapseLink& link, const CollapseRecord& record) {
+        links_.append(std::as_bytes(std::span(&link, 1)));
+        records_.append(std::as_bytes(std::span(&record, 1)));
+        ++size_;
+    }
+    uint32_t size() const { return size_; }
+    CollapseLink link(uint32_t i) const { return at<CollapseLink>(links_, i); }
+    CollapseRecord record(uint32_t i) const { return at<CollapseRecord>(records_, i); }
+
+private:
+    template <class T>
+    static T at(const Spill& spill, uint32_t i) {
+        T value;
+        spill.read(uint64_t(i) * sizeof(T), std::as_writable_bytes(std::span(&value, 1)));
+        return value;
+    }
+    Spill links_, records_;
+    uint32_t size_ = 0;
 };
 
 /// How the offsets of one operation's ends are stored.
@@ -40,44 +78,78 @@ struct QuantisedOffsets {
 };
 QuantisedOffsets quantiseOffsets(const std::array<Vec3i, 2>& offset);
 
+/// What a vertex has been through.
+struct VertexHistory {
+    uint32_t last = kNoOperation;  ///< the record of the last collapse into it
+    uint32_t height = 0;           ///< of that
+    uint32_t operations = 0;       ///< of that and all below
+    float error = 0;               ///< of that
+    Box3i box;                     ///< of that and all below
+};
+
 class Recorder : public CollapseSink {
 public:
     struct Refused {
         uint64_t irregular = 0, valence = 0, level = 0;
     };
 
-    /// `mesh`: the one that is simplified; `irregular`: one a vertex, as HalfEdges has it; both
-    /// must outlive this. Positions are multiples of 2^shift.
+    /// `mesh`: the one that is simplified; `irregular`: one a vertex, as HalfEdges has it, or empty
+    /// where such have the rank kRankFixed; both must outlive this. Positions are multiples of
+    /// 2^shift.
     Recorder(const Mesh& mesh, std::span<const uint8_t> irregular, int shift);
+    /// Goes on where others ended: `history` is that of the vertices, one each; records of this one
+    /// are counted from `first_record` on.
+    Recorder(const Mesh& mesh, std::vector<VertexHistory> history, uint32_t first_record,
+             int shift);
 
     bool take(const CollapseStep& step) override;
 
-    const std::vector<CollapseRecord>& records() const { return record_; }
+    /// As many links as records; children before parents.
+    std::vector<CollapseLink>& links() { return link_; }
+    const std::vector<CollapseLink>& links() const { return link_; }
+    std::vector<CollapseRecord>& records() { return record_; }
     uint32_t largestHeight() const { return largest_; }
     uint64_t dummies() const { return dummies_; }
     /// Attempts, not edges: an edge may be tried again.
     const Refused& refused() const { return refused_; }
-    /// The record of the last collapse into v, or kNoOperation.
-    uint32_t lastOf(uint32_t v) const { return last_[v]; }
+    const VertexHistory& historyOf(uint32_t v) const { return history_[v]; }
     OctNormal normalOf(uint32_t v) const { return normal_[v]; }
+    /// Has all its triangles in this mesh. Known only once a collapse was offered; else false.
+    bool isInside(uint32_t v) const { return !inside_.empty() && inside_[v]; }
 
 private:
     float precisionAt(const CollapseStep& step, uint32_t end) const;
     void recordDummy(const CollapseStep& step, uint32_t end);
-    void push(const CollapseRecord& record);
-    uint32_t heightOf(uint32_t v) const {
-        return last_[v] == kNoOperation ? 0 : record_[last_[v]].height;
-    }
+    void push(uint32_t v, CollapseLink link, CollapseRecord record);
+    void gatherRing(const CollapseStep& step, CollapseRecord& record) const;
+    uint32_t heightOf(uint32_t v) const { return history_[v].height; }
     Vec3i stepsOf(const WorkingMesh& mesh, const Vec3f& p) const;
 
     std::span<const uint8_t> irregular_;
     int shift_;
     std::vector<OctNormal> normal_;
-    std::vector<uint32_t> last_;
+    std::vector<VertexHistory> history_;
+    std::vector<uint8_t> inside_;
+    std::vector<float> error_before_;  // of what a vertex stands for, before this began
+    uint32_t first_record_ = 0;
+    std::vector<CollapseLink> link_;
     std::vector<CollapseRecord> record_;
     uint32_t largest_ = 0;
     uint64_t dummies_ = 0;
     Refused refused_;
+};
+
+/// All that was collapsed, and what remains. Vertices are numbers of any kind, below `vertices`.
+struct Collapses {
+    explicit Collapses(TempSpace& space) : store(space) {}
+    CollapseStore store;
+    Mesh base;
+    std::vector<uint32_t> base_vertex;  ///< the number of each
+    std::vector<uint32_t> base_last;    ///< the record it came from last, or kNoOperation
+    size_t vertices = 0;
+    uint32_t largest_height = 0;
+    uint64_t dummies = 0;
+    Recorder::Refused refused;
 };
 
 }  // namespace pietra::pmesh

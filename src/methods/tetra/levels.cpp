@@ -8,6 +8,7 @@
 #include "base/check.h"
 #include "base/parallel.h"
 #include "coarsen/diamond.h"
+#include "coarsen/level_items.h"
 #include "geometry/enclosing_ball.h"
 #include "store/page_codec.h"
 
@@ -25,14 +26,6 @@ struct CellState {
     NodeIndex position = kNoNode;  // in its level
     float error = 0;
     Sphere saturated;
-};
-
-/// A leaf, or all split cells of one diamond, in path order.
-struct Item {
-    std::vector<CellId> cells;
-    bool is_leaf = false;
-    uint64_t triangles = 0;  // expected
-    CellPath path() const { return firstPath(cells[0]); }
 };
 
 /// Items that share a page.
@@ -83,11 +76,11 @@ public:
 
 private:
     bool buildLevel(int level);
-    std::vector<Item> itemsOf(int level) const;
-    static std::vector<Unit> unitsOf(const std::vector<Item>& items);
-    UnitResult runUnit(std::span<const Item> items, int level);
-    void runLeaf(const Item& item, const CellMesh& mesh, UnitResult& result, Worker& worker) const;
-    void runDiamond(const Item& item, int level, DiamondOutput& output, UnitResult& result,
+    static std::vector<Unit> unitsOf(const std::vector<LevelItem>& items);
+    UnitResult runUnit(std::span<const LevelItem> items, int level);
+    void runLeaf(const LevelItem& item, const CellMesh& mesh, UnitResult& result,
+                 Worker& worker) const;
+    void runDiamond(const LevelItem& item, int level, DiamondOutput& output, UnitResult& result,
                     Worker& worker);
     static Node describe(const CellMesh& cell, Worker& worker);
     void write(UnitResult& result);
@@ -107,35 +100,9 @@ private:
     LevelCounts counts_;
 };
 
-std::vector<Item> LevelBuilder::itemsOf(int level) const {
-    std::vector<Item> items;
-    for (CellId leaf : leaves_.tree->leaves())
-        if (cellLevel(leaf) == level)
-            if (const auto blob = leaves_.blobs.find(leaf); blob != leaves_.blobs.end())
-                items.push_back({{leaf}, true, blob->second.triangles});
-    std::vector<std::pair<uint64_t, CellId>> by_diamond;
-    if (level < leaves_.tree->deepestLevel() || !below_.empty())
-        for (CellId cell : leaves_.tree->splitCells(level))
-            if (below_.count(cellChild(cell, 0)) || below_.count(cellChild(cell, 1)))
-                by_diamond.emplace_back(diamondKey(cell), cell);
-    std::sort(by_diamond.begin(), by_diamond.end());
-    for (size_t i = 0; i < by_diamond.size(); ++i) {
-        if (i == 0 || by_diamond[i].first != by_diamond[i - 1].first) items.emplace_back();
-        Item& item = items.back();
-        item.cells.push_back(by_diamond[i].second);
-        for (int bit : {0, 1})
-            if (const auto child = below_.find(cellChild(by_diamond[i].second, bit));
-                child != below_.end())
-                item.triangles += child->second.blob.triangles / 2;
-    }
-    std::sort(items.begin(), items.end(),
-              [](const Item& a, const Item& b) { return a.path() < b.path(); });
-    return items;
-}
-
-std::vector<Unit> LevelBuilder::unitsOf(const std::vector<Item>& items) {
+std::vector<Unit> LevelBuilder::unitsOf(const std::vector<LevelItem>& items) {
     uint64_t of_level = 0;
-    for (const Item& item : items) of_level += item.triangles;
+    for (const LevelItem& item : items) of_level += item.triangles;
     const uint64_t enough =
         std::clamp(of_level / kUnitsOfLevel, kSmallestPageTriangles, kPageTriangles);
     std::vector<Unit> units;
@@ -152,7 +119,10 @@ std::vector<Unit> LevelBuilder::unitsOf(const std::vector<Item>& items) {
 }
 
 bool LevelBuilder::buildLevel(int level) {
-    const std::vector<Item> items = itemsOf(level);
+    const std::vector<LevelItem> items = itemsOfLevel(leaves_, level, [&](CellId cell) {
+        const auto state = below_.find(cell);
+        return state == below_.end() ? nullptr : &state->second.blob;
+    });
     if (items.empty()) return false;
     const std::vector<Unit> units = unitsOf(items);
     store_ = std::make_unique<CellStore>(space_, int(settings_.schema.scalars.size()));
@@ -171,7 +141,7 @@ bool LevelBuilder::buildLevel(int level) {
     return true;
 }
 
-UnitResult LevelBuilder::runUnit(std::span<const Item> items, int level) {
+UnitResult LevelBuilder::runUnit(std::span<const LevelItem> items, int level) {
     UnitResult result;
     Worker& worker = workers_.local();
     worker.outputs.resize(std::max(worker.outputs.size(), items.size()));
@@ -211,7 +181,7 @@ Node LevelBuilder::describe(const CellMesh& cell, Worker& worker) {
     return node;
 }
 
-void LevelBuilder::runLeaf(const Item& item, const CellMesh& mesh, UnitResult& result,
+void LevelBuilder::runLeaf(const LevelItem& item, const CellMesh& mesh, UnitResult& result,
                            Worker& worker) const {
     Node node = describe(mesh, worker);
     node.saturated = node.bounds;
@@ -222,7 +192,7 @@ void LevelBuilder::runLeaf(const Item& item, const CellMesh& mesh, UnitResult& r
     result.input_triangles += node.triangles;
 }
 
-void LevelBuilder::runDiamond(const Item& item, int level, DiamondOutput& output,
+void LevelBuilder::runDiamond(const LevelItem& item, int level, DiamondOutput& output,
                               UnitResult& result, Worker& worker) {
     DiamondInput& input = worker.input;
     input.children.assign(item.cells.size(), {});

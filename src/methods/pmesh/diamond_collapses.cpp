@@ -1,0 +1,350 @@
+#include "methods/pmesh/diamond_collapses.h"
+
+#include <algorithm>
+#include <cstring>
+#include <unordered_map>
+
+#include "base/check.h"
+#include "base/parallel.h"
+#include "coarsen/diamond.h"
+#include "coarsen/key_map.h"
+#include "coarsen/level_items.h"
+#include "simplify/simplify.h"
+
+namespace pietra::pmesh {
+namespace {
+
+/// Records of a diamond before they have their final numbers.
+constexpr uint32_t kLocal = 1u << 31;
+
+/// What a vertex carries from diamond to diamond, in the place of scalars.
+struct VertexState {
+    std::array<uint32_t, 2> key{};
+    uint32_t number = kNoVertex;  ///< of all vertices; given in its first diamond
+    VertexHistory history;
+
+    uint64_t name() const { return key[0] | uint64_t(key[1]) << 32; }
+    static VertexState of(uint64_t name) {
+        VertexState state;
+        state.key = {uint32_t(name), uint32_t(name >> 32)};
+        return state;
+    }
+};
+constexpr size_t kStateFloats = sizeof(VertexState) / sizeof(float);
+static_assert(sizeof(VertexState) % sizeof(float) == 0);
+
+VertexState stateOf(const Mesh& mesh, size_t v) {
+    VertexState state;
+    std::memcpy(static_cast<void*>(&state), &mesh.scalar[kStateFloats * v], sizeof state);
+    return state;
+}
+
+struct Cell {
+    CellBlob blob;
+    float error = 0;  ///< largest of its vertices
+};
+
+struct DiamondResult {
+    std::vector<CellId> ids;
+    std::vector<CellMesh> cells;  ///< states as scalars, with local records
+    std::vector<float> errors;
+    std::vector<CollapseLink> link;
+    std::vector<CollapseRecord> record;
+    // One a vertex that records mean:
+    std::vector<VertexState> vertex;
+    std::vector<uint8_t> inside;  ///< Recorder::isInside()
+    uint32_t largest_height = 0;
+    uint64_t dummies = 0, input_triangles = 0;
+    Recorder::Refused refused;
+};
+
+/// Merges cells by the names of their vertices and collapses what may be.
+class Collapser {
+public:
+    explicit Collapser(int shift) : shift_(shift) {}
+
+    void begin() {
+        mesh_.clear();
+        label_.clear();
+        state_.clear();
+        ids_.reserve(0);
+    }
+    void add(const Mesh& child, bool is_leaf, uint8_t label);
+    void run(std::span<const uint32_t> quota, float child_error, DiamondResult& result);
+    size_t triangleCount() const { return mesh_.triangleCount(); }
+
+    CellMesh scratch;
+
+private:
+    void takeApart(const Recorder& recorder, size_t cells, DiamondResult& result);
+
+    int shift_;
+    Simplifier simplifier_;
+    SimplifyOutput simplified_;
+    Mesh mesh_;
+    std::vector<uint8_t> label_;
+    std::vector<VertexState> state_;
+    KeyMap ids_;
+    std::vector<uint32_t> local_;
+};
+
+void Collapser::add(const Mesh& child, bool is_leaf, uint8_t label) {
+    local_.resize(child.vertexCount());
+    for (size_t v = 0; v < child.vertexCount(); ++v) {
+        const VertexState state =
+            is_leaf ? VertexState::of(latticeKey(child.position[v])) : stateOf(child, v);
+        const auto [id, is_new] = ids_.insert(state.name(), uint32_t(mesh_.vertexCount()));
+        local_[v] = id;
+        if (!is_new) {
+            CHECK(mesh_.position[id] == child.position[v]);
+            if (state.number != kNoVertex) state_[id] = state;
+            continue;
+        }
+        mesh_.position.push_back(child.position[v]);
+        mesh_.normal.push_back(child.normal[v]);
+        state_.push_back(state);
+    }
+    for (size_t t = 0; t < child.triangleCount(); ++t) {
+        const Triangle& f = child.triangle[t];
+        mesh_.triangle.push_back({local_[f[0]], local_[f[1]], local_[f[2]]});
+        mesh_.edge_class.push_back(child.edge_class[t]);
+        label_.push_back(label);
+    }
+}
+
+void Collapser::run(std::span<const uint32_t> quota, float child_error, DiamondResult& result) {
+    result.input_triangles = mesh_.triangleCount();
+    if (mesh_.triangle.empty()) {
+        result.cells.resize(quota.size());
+        result.errors.assign(quota.size(), 0);
+        return;
+    }
+    std::vector<VertexHistory> history;
+    for (const VertexState& state : state_) history.push_back(state.history);
+    Recorder recorder(mesh_, std::move(history), kLocal, shift_);
+    SimplifyInput input;
+    input.mesh = &mesh_;
+    input.cell = label_;
+    input.quota = quota;
+    input.shift = shift_;
+    input.free_error = child_error;
+    input.sink = &recorder;
+    simplifier_.run(input, simplified_);
+    takeApart(recorder, quota.size(), result);
+    result.link = std::move(recorder.links());
+    result.record = std::move(recorder.records());
+    result.vertex = state_;
+    for (uint32_t v = 0; v < state_.size(); ++v) result.inside.push_back(recorder.isInside(v));
+    result.largest_height = recorder.largestHeight();
+    result.dummies = recorder.dummies();
+    result.refused = recorder.refused();
+}
+
+void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult& result) {
+    const Mesh& mesh = simplified_.mesh;
+    std::vector<uint32_t> survivor(mesh.vertexCount(), kNoVertex);
+    std::vector<uint8_t> gone(state_.size(), 0);
+    for (const CollapseLink& link : recorder.links())
+        if (link.u != kNoVertex) gone[link.u] = 1;
+    for (uint32_t v = 0; v < state_.size(); ++v)
+        if (!gone[v] && simplified_.vertex_map[v] != kNone) {
+            CHECK_EQ(survivor[simplified_.vertex_map[v]], kNoVertex);
+            survivor[simplified_.vertex_map[v]] = v;
+        }
+    result.cells.resize(cells);
+    result.errors.assign(cells, 0);
+    for (size_t c = 0; c < cells; ++c) {
+        Mesh& cell = result.cells[c].mesh;
+        local_.assign(mesh.vertexCount(), kNoVertex);
+        for (size_t t = 0; t < mesh.triangleCount(); ++t) {
+            if (simplified_.cell[t] != c) continue;
+            Triangle triangle;
+            for (size_t k = 0; k < 3; ++k) {
+                const uint32_t at = mesh.triangle[t][k], v = survivor[at];
+                if (local_[at] == kNoVertex) {
+                    local_[at] = uint32_t(cell.vertexCount());
+                    cell.position.push_back(mesh.position[at]);
+                    cell.normal.push_back(recorder.normalOf(v));
+                    VertexState state = state_[v];
+                    state.history = recorder.historyOf(v);
+                    state.number = v;  // of this diamond, until take()
+                    cell.scalar.resize(cell.scalar.size() + kStateFloats);
+                    std::memcpy(cell.scalar.data() + cell.scalar.size() - kStateFloats, &state,
+                                sizeof state);
+                    result.errors[c] = std::max(result.errors[c], state.history.error);
+                }
+                triangle[k] = local_[at];
+            }
+            cell.triangle.push_back(triangle);
+            cell.edge_class.push_back(mesh.edge_class[t]);
+        }
+        // The engine's bounds are not for this method.
+        result.cells[c].bounds.to_original.assign(cell.triangleCount(), 0);
+        result.cells[c].bounds.from_original.assign(cell.triangleCount(), 0);
+    }
+}
+
+class LevelCollapser {
+public:
+    LevelCollapser(InputLeaves& input, uint32_t patch_triangles, int jobs, TempSpace& space,
+                   Progress& progress, Collapses& out)
+        : input_(input),
+          patch_triangles_(patch_triangles),
+          jobs_(jobs),
+          space_(space),
+          progress_(progress),
+          out_(out),
+          workers_([&input] { return Collapser(input.vertices.lattice().shift); }) {}
+
+    void run() {
+        progress_.beginStage("collapse", input_.leaves.triangles * 3);
+        for (int level = input_.leaves.tree->deepestLevel(); level >= 0; --level) runLevel(level);
+        runRoot();
+        out_.vertices = vertices_;
+    }
+
+private:
+    void runLevel(int level);
+    DiamondResult runDiamond(const LevelItem& item, int level);
+    void runRoot();
+    void addCell(const Cell& cell, uint8_t label, Collapser& worker) const {
+        cell.blob.store->get(cell.blob, worker.scratch);
+        worker.add(worker.scratch.mesh, cell.blob.store == &input_.store, label);
+    }
+    void take(DiamondResult& result);
+    /// Only what other diamonds may have, too, must be looked up.
+    uint32_t numberOf(const VertexState& vertex, bool inside) {
+        if (vertex.number != kNoVertex) return vertex.number;
+        if (inside) return vertices_++;
+        const auto [number, is_new] = number_of_.insert(vertex.name(), vertices_);
+        vertices_ += is_new;
+        return number;
+    }
+    static uint32_t globalRecord(uint32_t record, uint32_t first) {
+        return record == kNoOperation || record < kLocal ? record : first + (record - kLocal);
+    }
+
+    InputLeaves& input_;
+    uint32_t patch_triangles_;
+    int jobs_;
+    TempSpace& space_;
+    Progress& progress_;
+    Collapses& out_;
+    PerThread<Collapser> workers_;
+    std::unordered_map<CellId, Cell> below_, cells_;
+    std::unique_ptr<CellStore> store_below_, store_;
+    KeyMap number_of_;
+    uint32_t vertices_ = 0;
+};
+
+void LevelCollapser::runLevel(int level) {
+    const auto items = itemsOfLevel(input_.leaves, level, [&](CellId cell) {
+        const auto found = below_.find(cell);
+        return found == below_.end() ? nullptr : &found->second.blob;
+    });
+    store_ = std::make_unique<CellStore>(space_, int(kStateFloats));
+    cells_.clear();
+    std::vector<LevelItem> diamonds;
+    for (const LevelItem& item : items) {
+        if (item.is_leaf)
+            cells_[item.cells[0]] = {input_.leaves.blobs.at(item.cells[0]), 0};
+        else
+            diamonds.push_back(item);
+    }
+    orderedPipeline(
+        diamonds.size(), size_t(jobs_) * 2,
+        [&](size_t i) { return runDiamond(diamonds[i], level); },
+        [&](DiamondResult& result) { take(result); });
+    below_ = std::move(cells_);
+    store_below_ = std::move(store_);
+}
+
+DiamondResult LevelCollapser::runDiamond(const LevelItem& item, int level) {
+    Collapser& worker = workers_.local();
+    DiamondResult result;
+    result.ids = item.cells;
+    worker.begin();
+    std::vector<uint32_t> quota;
+    float error = 0;
+    for (size_t c = 0; c < item.cells.size(); ++c) {
+        const size_t before = worker.triangleCount();
+        for (const int bit : {0, 1}) {
+            const auto child = below_.find(cellChild(item.cells[c], bit));
+            if (child == below_.end()) continue;
+            addCell(child->second, uint8_t(c), worker);
+            error = std::max(error, child->second.error);
+        }
+        quota.push_back(cellQuota(worker.triangleCount() - before, patch_triangles_, level));
+    }
+    worker.run(quota, error, result);
+    progress_.tick(result.input_triangles);
+    return result;
+}
+
+/// Gives records and vertices their numbers.
+void LevelCollapser::take(DiamondResult& result) {
+    const uint32_t first = out_.store.size();
+    CHECK_LT(first + result.record.size(), size_t(kLocal));
+    std::vector<uint32_t> number;
+    for (size_t v = 0; v < result.vertex.size(); ++v)
+        number.push_back(numberOf(result.vertex[v], result.inside[v]));
+    for (size_t i = 0; i < result.record.size(); ++i) {
+        CollapseLink& link = result.link[i];
+        CollapseRecord& r = result.record[i];
+        if (link.u != kNoVertex) link.u = number[link.u];
+        for (uint32_t& child : link.child) child = globalRecord(child, first);
+        for (uint8_t k = 0; k < r.ring_size; ++k) r.ring[k] = number[r.ring[k]];
+        out_.store.append(link, r);
+    }
+    for (size_t c = 0; c < result.ids.size(); ++c) {
+        Mesh& mesh = result.cells[c].mesh;
+        for (size_t v = 0; v < mesh.vertexCount(); ++v) {
+            VertexState state = stateOf(mesh, v);
+            state.history.last = globalRecord(state.history.last, first);
+            state.number = number[state.number];
+            std::memcpy(&mesh.scalar[kStateFloats * v], &state, sizeof state);
+        }
+        cells_[result.ids[c]] = {store_->put(result.cells[c]), result.errors[c]};
+    }
+    out_.largest_height = std::max(out_.largest_height, result.largest_height);
+    out_.dummies += result.dummies;
+    out_.refused.irregular += result.refused.irregular;
+    out_.refused.valence += result.refused.valence;
+    out_.refused.level += result.refused.level;
+}
+
+/// What the cells of level 0 have left, down to the base.
+void LevelCollapser::runRoot() {
+    store_ = std::make_unique<CellStore>(space_, int(kStateFloats));
+    Collapser& worker = workers_.local();
+    DiamondResult result;
+    std::vector<CellId> cells;
+    for (const auto& [id, cell] : below_) cells.push_back(id);
+    std::sort(cells.begin(), cells.end());
+    worker.begin();
+    float error = 0;
+    for (const CellId id : cells) {
+        addCell(below_[id], 0, worker);
+        error = std::max(error, below_[id].error);
+    }
+    const uint32_t nothing = 0;
+    worker.run({&nothing, 1}, error, result);
+    result.ids = {cells.front()};
+    take(result);
+    out_.base = std::move(result.cells[0].mesh);
+    for (size_t v = 0; v < out_.base.vertexCount(); ++v) {
+        const VertexState state = stateOf(out_.base, v);
+        out_.base_vertex.push_back(state.number);
+        out_.base_last.push_back(state.history.last);
+    }
+    out_.base.scalar.clear();
+}
+
+}  // namespace
+
+void collapseByDiamonds(InputLeaves& input, uint32_t patch_triangles, int jobs, TempSpace& space,
+                        Progress& progress, Collapses& out) {
+    LevelCollapser(input, patch_triangles, jobs, space, progress, out).run();
+}
+
+}  // namespace pietra::pmesh

@@ -1,0 +1,264 @@
+#include "methods/pmesh/encoder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/check.h"
+#include "methods/pmesh/node_packer.h"
+
+namespace pietra::pmesh {
+namespace {
+
+/// Integer, rounded up.
+uint32_t lengthOf(const Vec3i& v) {
+    const Vec3d d(v);
+    return uint32_t(std::ceil(std::sqrt(glm::dot(d, d))));
+}
+
+/// Of an error in steps.
+uint8_t errorCode(double error) {
+    const uint64_t units = std::max<uint64_t>(uint64_t(std::ceil(error / kErrorUnit)), 1);
+    return uint8_t(std::min(encodeRoundedUp<3>(units), kMaxErrorCode));
+}
+
+/// What the operations that a node refers to in a child know from above...
+struct FromAbove {
+    Vec3i centre;
+    ChildCode before;  ///< if it is a dummy
+};
+/// ...and tell.
+struct FromBelow {
+    uint16_t level, radius;
+    uint8_t error;
+};
+
+class Encoder {
+public:
+    Encoder(const Collapses& collapses, Packing& packing, BuildCounts& counts, const NodeSink& sink,
+            NodeForest& forest)
+        : collapses_(collapses),
+          packing_(packing),
+          counts_(counts),
+          sink_(sink),
+          forest_(forest),
+          step_(double(1 << forest.lattice.shift)) {}
+
+    void run() {
+        makeBase();
+        std::vector<std::vector<FromAbove>> roots(forest_.row.size());
+        for (size_t v = 0; v < forest_.base_vertex.size(); ++v)
+            if (const OperationId o = forest_.base_operation[v]; o != kNoOperation)
+                roots[nodeOf(o)].push_back({forest_.base_vertex[v].position(), kNoChildCode});
+        for (NodeIndex n = 0; n < forest_.row.size(); ++n)
+            if (forest_.row[n].parent == kNoNode) encodeNode(n, roots[n]);
+    }
+
+private:
+    struct Work {
+        OperationNode node;
+        std::vector<PackedSlot> slot;
+        std::vector<Operation> operation;
+        std::vector<FromAbove> above;  // of each slot
+        std::array<std::vector<FromAbove>, 2> children;
+        std::array<std::vector<FromBelow>, 2> below;
+    };
+
+    void makeBase();
+    std::vector<FromBelow> encodeNode(NodeIndex n, std::span<const FromAbove> frontier);
+    void refine(Work& work) const;
+    Operation encodeOperation(const CollapseRecord& r, const Vec3i& from) const;
+    void setRanks(Operation& o, const CollapseRecord& r) const;
+    void setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& from, uint32_t kinds) const;
+    static void saturate(Work& work);
+    void bound(NodeIndex n, const Work& work);
+
+    const Collapses& collapses_;
+    Packing& packing_;
+    BuildCounts& counts_;
+    const NodeSink& sink_;
+    NodeForest& forest_;
+    double step_;
+};
+
+void Encoder::makeBase() {
+    const Mesh& base = collapses_.base;
+    forest_.base_triangle = base.triangle;
+    forest_.base_operation = packing_.base_operation;
+    forest_.row = packing_.row;
+    for (OperationId& maker : packing_.maker)
+        if (maker != kNoOperation) maker += uint32_t(base.vertexCount());
+    counts_.name_of = std::move(packing_.maker);
+    for (uint32_t v = 0; v < base.vertexCount(); ++v) {
+        const Vec3i p = base.position[v] >> forest_.lattice.shift;
+        forest_.base_vertex.push_back({p.x, p.y, p.z, packNormal(base.normal[v])});
+        counts_.name_of[collapses_.base_vertex[v]] = v;
+    }
+}
+
+std::vector<FromBelow> Encoder::encodeNode(NodeIndex n, std::span<const FromAbove> frontier) {
+    Work work;
+    work.slot = packing_.slots(n);
+    work.above.assign(frontier.begin(), frontier.end());
+    work.node.frontier = uint32_t(frontier.size());
+    refine(work);
+    for (const size_t side : {0u, 1u}) {
+        const NodeIndex child = forest_.row[n].child[side];
+        if (child != kNoNode) work.below[side] = encodeNode(child, work.children[side]);
+        for (const FromBelow& b : work.below[side])
+            work.node.reference_level[side].push_back(b.level);
+    }
+    saturate(work);
+    bound(n, work);
+    std::vector<FromBelow> told;
+    for (uint32_t s = 0; s < work.node.frontier; ++s) {
+        const NodeOperation& o = work.node.operation[s];
+        told.push_back({uint16_t(o.structure.level()), o.radius, o.error});
+    }
+    sink_(n, forest_.row[n], work.node);
+    return told;
+}
+
+/// From slot to slot, as the decoder will.
+void Encoder::refine(Work& work) const {
+    std::array<uint32_t, 3> next{work.node.frontier, 0, 0};
+    for (uint32_t s = 0; s < work.slot.size(); ++s) {
+        const CollapseRecord r = collapses_.store.record(work.slot[s].record);
+        const FromAbove above = work.above[s];
+        Operation o = encodeOperation(r, above.centre);
+        if (!o.isDummy()) setOffsets(o, r, above.centre, work.slot[s].kinds);
+        std::array<ChildCode, 2> code{kNoChildCode, o.isDummy() ? above.before : kNoChildCode};
+        for (const int end : {0, 1}) {
+            const uint32_t kind = work.slot[s].kinds >> (2 * end) & 3;
+            if (kind == 0) continue;
+            code[size_t(end)] = (kind - 1) * kNodeSlots + next[kind - 1]++;
+            const Vec3i centre = above.centre + o.offset(end);
+            if (kind == 1)
+                work.above.push_back({centre, s});
+            else
+                work.children[kind - 2].push_back({centre, kNodeSlots + s});
+        }
+        work.operation.push_back(o);
+        NodeOperation packed;
+        packed.structure = StructureWord::of(code[0], code[1], o.level);
+        packed.ranks = o.ranks;
+        packed.delta = o.delta;
+        packed.normal = o.normal;
+        packed.shift = o.shift;
+        work.node.operation.push_back(packed);
+    }
+}
+
+Operation Encoder::encodeOperation(const CollapseRecord& r, const Vec3i& from) const {
+    Operation o{};
+    o.level = uint16_t(collapses_.largest_height - r.height);
+    o.normal = r.normal;
+    o.radius = uint16_t(encodeRoundedUp<11>(r.radius));
+    o.error = errorCode(double(r.error) / step_);
+    if (r.ring_size > 0) {
+        setRanks(o, r);
+        return o;
+    }
+    // A dummy: to where the vertex is to be, as far as sixteen bits reach.
+    o.ranks = Operation::kDummyRanks;
+    const Vec3i offset = glm::clamp(r.position[0] - from, -32768, 32767);
+    for (int k = 0; k < 3; ++k) {
+        o.delta[0][size_t(k)] = int8_t(offset[k] >> 8);
+        o.delta[1][size_t(k)] = int8_t(offset[k] & 0xff);
+    }
+    o.radius = uint16_t(encodeRoundedUp<11>(lengthOf(offset)));
+    o.error = std::max(o.error, errorCode(lengthOf(offset)));
+    return o;
+}
+
+void Encoder::setRanks(Operation& o, const CollapseRecord& r) const {
+    const auto name = [&](uint32_t i) { return counts_.name_of[r.ring[i]]; };
+    uint32_t least = 0;
+    for (uint32_t i = 1; r.closed && i < r.ring_size; ++i)
+        if (name(i) < name(least)) least = i;
+    const auto rank = [&](uint32_t place) {
+        return place == kNoRank ? kNoRank : (place + r.ring_size - least) % r.ring_size;
+    };
+    o.ranks = uint8_t(rank(r.left) | rank(r.right) << 4);
+}
+
+void Encoder::setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& from,
+                         uint32_t kinds) const {
+    const std::array<Vec3i, 2> offset{r.position[0] - from, r.position[1] - from};
+    const QuantisedOffsets q = quantiseOffsets(offset);
+    o.shift = q.shift;
+    o.delta = q.delta;
+    for (const int end : {0, 1}) {
+        if ((kinds >> (2 * end) & 3) != 0) continue;  // an operation below puts it right
+        const Vec3i rest = glm::abs(o.offset(end) - offset[size_t(end)]);
+        const uint32_t largest = uint32_t(std::max({rest.x, rest.y, rest.z}));
+        counts_.inexact_ends += largest != 0;
+        counts_.largest_error = std::max(counts_.largest_error, largest);
+    }
+}
+
+/// From the last slot up: no operation states less than those below it.
+void Encoder::saturate(Work& work) {
+    for (size_t s = work.slot.size(); s-- > 0;) {
+        Operation& o = work.operation[s];
+        uint32_t radius = decodeRadius(o.radius);
+        for (const int end : {0, 1}) {
+            const uint32_t kind = work.slot[s].kinds >> (2 * end) & 3;
+            const uint32_t slot = work.node.operation[s].structure.child(end) % kNodeSlots;
+            if (!o.isDummy() || kind != 0) radius = std::max(radius, lengthOf(o.offset(end)));
+            if (kind == 0) continue;
+            const auto enclose = [&](uint16_t below, uint8_t error) {
+                o.error = std::max(o.error, error);
+                radius = std::max(radius, lengthOf(o.offset(end)) + decodeRadius(below));
+            };
+            if (kind == 1)
+                enclose(work.operation[slot].radius, work.operation[slot].error);
+            else
+                enclose(work.below[kind - 2][slot].radius, work.below[kind - 2][slot].error);
+        }
+        const uint32_t code = encodeRoundedUp<11>(radius);
+        CHECK_LE(code, kMaxRadiusCode);
+        work.node.operation[s].radius = o.radius = uint16_t(code);
+        work.node.operation[s].error = o.error;
+    }
+}
+
+/// The sphere around those of the operations referred to from above, which enclose all below, and
+/// around the children's, whose rounding may stick out.
+void Encoder::bound(NodeIndex n, const Work& work) {
+    NodeRow& row = forest_.row[n];
+    Box3i box;
+    for (uint32_t s = 0; s < work.node.frontier; ++s) box.add(work.above[s].centre);
+    if (box.empty()) return;
+    row.centre = (box.min + box.max) >> 1;
+    uint32_t radius = 0;
+    const auto enclose = [&](const Vec3i& centre, uint16_t code, uint8_t error) {
+        radius = std::max(radius, lengthOf(centre - row.centre) + decodeRadius(code));
+        row.error = std::max(row.error, error);
+    };
+    for (uint32_t s = 0; s < work.node.frontier; ++s)
+        enclose(work.above[s].centre, work.operation[s].radius, work.operation[s].error);
+    for (const NodeIndex c : row.child)
+        if (c != kNoNode)
+            enclose(forest_.row[c].centre, forest_.row[c].radius, forest_.row[c].error);
+    row.radius = uint16_t(encodeRoundedUp<11>(radius));
+}
+
+}  // namespace
+
+NodeForest encode(const Collapses& collapses, const Lattice& lattice, TempSpace& space,
+                  BuildCounts& counts, const NodeSink& sink) {
+    counts.refused = collapses.refused;
+    counts.levels = collapses.largest_height;
+    counts.dummies = collapses.dummies;
+    counts.operations = collapses.store.size();
+    const Reservation names = space.budget->reserve(sizeof(OperationId) * collapses.vertices,
+                                                    "the names of all vertices of a mesh");
+    Packing packing(space);
+    packCollapses(collapses, packing);
+    NodeForest forest;
+    forest.lattice = lattice;
+    Encoder(collapses, packing, counts, sink, forest).run();
+    return forest;
+}
+
+}  // namespace pietra::pmesh
