@@ -48,14 +48,11 @@ void report(const ProgressiveMesh& mesh, const BuildCounts& counts, double secon
 /// Passes to the end; operations a second.
 void settle(const char* what, Adaption& adaption, const Criterion& criterion) {
     const double begin = now();
-    uint64_t operations = 0;
-    int passes = 0;
-    for (PassCounts counts; ++passes, (counts = adaption.pass(criterion)).operations() > 0;)
-        operations += counts.operations();
+    const PassCounts counts = adaption.settle(criterion);
     const double seconds = now() - begin;
-    std::printf("  %s: %llu operations in %d passes, %.1f ms: %.2f M/s; %zu faces\n", what,
-                static_cast<unsigned long long>(operations), passes, seconds * 1e3,
-                double(operations) / seconds * 1e-6, adaption.mesh().faceCount());
+    std::printf("  %s: %u operations in %u passes, %.1f ms: %.2f M/s; %zu faces\n", what,
+                counts.operations(), counts.passes, seconds * 1e3,
+                counts.operations() / seconds * 1e-6, adaption.mesh().faceCount());
 }
 
 Criterion viewFrom(const Box3d& box, const Lattice& lattice, double turn, double distance,

@@ -68,8 +68,8 @@ ActiveMesh::ActiveMesh(const ProgressiveMesh& mesh) : source_(&mesh) {
     record.resize(vertex.size());
     criteria.resize(vertex.size());
     for (uint32_t v = 0; v < vertex.size(); ++v) {
-        record[v].name = v;
-        record[v].corner = edges.corner_of[v];
+        pulse[v].name = v;
+        pulse[v].corner = edges.corner_of[v];
         setLast(v, kNoOperation);
         setNext(v, mesh.base_operation[v]);
     }
@@ -91,7 +91,7 @@ void ActiveMesh::resize(size_t vertices, size_t faces) {
 
 void ActiveMesh::setNext(uint32_t v, OperationId next) {
     record[v].next = next;
-    pulse[v].changed = time;
+    pulse[v].blocker = VertexPulse::kNoBlocker;
     const bool none = next == kNoOperation;
     pulse[v].next_level = none ? uint16_t(kLeafLevel) : source_->operation[next].level;
     criteria[v].split_radius = none ? uint16_t(0) : source_->operation[next].radius;
@@ -113,7 +113,7 @@ bool ActiveMesh::orient(Star& star) const {
     if (!star.closed) return true;
     uint32_t least = 0, least_name = ~0u;
     for (uint32_t i = 0; i < star.count; ++i) {
-        const uint32_t name = record[neighbour(star, i)].name;
+        const uint32_t name = pulse[neighbour(star, i)].name;
         if (name < least_name) least = i, least_name = name;
     }
     std::rotate(star.corner.begin(), star.corner.begin() + least, star.corner.begin() + star.count);
@@ -163,11 +163,12 @@ bool ActiveMesh::apply(uint32_t v) {
     if (star.closed && faces < 2) return false;
     const uint32_t u = uint32_t(vertexCount()), first_face = uint32_t(faceCount());
     resize(u + 1, first_face + faces);
-    split(v, star, u, first_face);
+    split(v, star, u, {first_face, first_face + 1});
     return true;
 }
 
-void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t first_face) {
+void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u,
+                       std::array<uint32_t, 2> faces) {
     const OperationId id = record[v].next;
     const Operation& o = source_->operation[id];
     const uint32_t n = star.count, l = o.rankLeft(), r = o.rankRight();
@@ -186,7 +187,7 @@ void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t first_
         setVertexAt(star.corner[i], u);
         if (++i == n) i = 0;
     }
-    const uint32_t fl = 4 * first_face, fr = has_left ? fl + 4 : fl;
+    const uint32_t fl = 4 * faces[0], fr = 4 * faces[has_left ? 1 : 0];
     if (has_left) {
         const uint32_t of_u = triangle(l - 1), of_v = triangle(l);
         face[fl >> 2].vertex = {v, u, vl, 0};
@@ -203,15 +204,15 @@ void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t first_
         link(fr + 2, of_u);
         if (of_u == kNoCorner) corner(vr).store(fr + 2, kRelaxed);
     }
-    VertexRecord& a = record[v];
-    VertexRecord& b = record[u];
+    VertexPulse& a = pulse[v];
+    VertexPulse& b = pulse[u];
     a.corner = has_left ? fl : fr + 1;
     b.corner = has_left ? fl + 1 : fr;
     if (!star.closed) a.corner = firstCorner(a.corner), b.corner = firstCorner(b.corner);
 
     b.name = source_->nameOf(id);
-    b.undo_last = a.last;
-    b.undo_normal = uint16_t(vertex[v].normal);
+    record[u].undo_last = record[v].last;
+    record[u].undo_normal = uint16_t(vertex[v].normal);
     vertex[u] = vertex[v];
     vertex[u].moveBy(o.offset(1));
     vertex[u].normal = o.normal[1];
@@ -224,8 +225,8 @@ void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t first_
 }
 
 std::array<uint32_t, 2> ActiveMesh::merge(uint32_t v, uint32_t u) {
-    VertexRecord& a = record[v];
-    VertexRecord& b = record[u];
+    VertexPulse& a = pulse[v];
+    VertexPulse& b = pulse[u];
     const bool open = twinOf(a.corner) == kNoCorner || twinOf(b.corner) == kNoCorner;
     uint32_t fl = kNoCorner, fr = kNoCorner;  // their first corners: of v, of u
     for (uint32_t c = b.corner; c != kNoCorner;) {
@@ -250,10 +251,10 @@ std::array<uint32_t, 2> ActiveMesh::merge(uint32_t v, uint32_t u) {
     }
     a.corner = open ? firstCorner(stays) : stays;
 
-    const OperationId id = a.last;
+    const OperationId id = record[v].last;
     vertex[v].moveBy(-source_->operation[id].offset(0));
-    vertex[v].normal = b.undo_normal;
-    setLast(v, b.undo_last);
+    vertex[v].normal = record[u].undo_normal;
+    setLast(v, record[u].undo_last);
     setNext(v, id);
     b.name = kNoCorner;
     return {fl == kNoCorner ? fl : fl >> 2, fr == kNoCorner ? fr : fr >> 2};
@@ -296,9 +297,8 @@ void ActiveMesh::moveVertex(uint32_t from, uint32_t to) {
     vertex[to] = vertex[from];
     record[to] = record[from];
     pulse[to] = pulse[from];
-    pulse[to].changed = time;
     criteria[to] = criteria[from];
-    const uint32_t first = record[to].corner;
+    const uint32_t first = pulse[to].corner;
     for (uint32_t c = first; c != kNoCorner;) {
         setVertexAt(c, to);
         c = leftOf(c);
@@ -349,10 +349,7 @@ void ActiveMesh::sortInSpace() {
                 moved(face[f].twin[k]);
             }
     });
-    for (size_t v = 0; v < vertexCount(); ++v) {
-        moved(record[v].corner);
-        pulse[v].changed = time;
-    }
+    for (VertexPulse& p : pulse) moved(p.corner);
     permute(vertex, place);
     permute(pulse, place);
     permute(criteria, place);
@@ -368,7 +365,7 @@ std::string validateStars(const ProgressiveMesh& mesh) {
     for (OperationId id = 0; id < mesh.operation.size(); ++id) {
         const Operation& o = mesh.operation[id];
         const uint32_t v = vertex_of[id];
-        if (active.record[v].corner == kNoCorner)
+        if (active.pulse[v].corner == kNoCorner)
             return fmt::format("operation {}: its vertex has no triangles", id);
         if (!active.allNeighbours(v,
                                   [&](uint32_t w) { return active.pulse[w].next_level > o.level; }))

@@ -32,21 +32,24 @@ struct alignas(32) ActiveFace {
     bool operator==(const ActiveFace&) const = default;
 };
 
-/// What an operation on a vertex needs.
-struct VertexRecord {
+/// What a vertex's neighbours look at.
+struct alignas(16) VertexPulse {
     uint32_t name;
-    uint32_t corner;        ///< one of its corners; where the fan is open, the first
-    OperationId next;       ///< its next split, or kNoOperation
-    OperationId last;       ///< the split it came from last, or kNoOperation
-    OperationId undo_last;  ///< if it is the u of a split: what v had before
-    uint32_t undo_normal;   ///< the same
+    uint32_t corner;               ///< one of its corners; where the fan is open, the first
+    uint32_t blocker = kNoBlocker; ///< the name of a neighbour, for Adaption
+    uint16_t next_level;           ///< of the next split, or kLeafLevel
+    uint16_t last_level;           ///< 1 + that of the last, or 0; equal only for v and u of one split
+    static constexpr uint32_t kNoBlocker = ~0u;
+    bool operator==(const VertexPulse&) const = default;
 };
 
-/// What a vertex's neighbours look at.
-struct VertexPulse {
-    uint16_t next_level;   ///< of the next split, or kLeafLevel
-    uint16_t last_level;   ///< 1 + that of the last, or 0; equal only for v and u of one split
-    uint32_t changed = 0;  ///< ActiveMesh::time when it last split, merged or got another place
+/// What an operation on a vertex needs.
+struct alignas(16) VertexRecord {
+    OperationId next;            ///< its next split, or kNoOperation
+    OperationId last;            ///< the split it came from last, or kNoOperation
+    OperationId undo_last = 0;   ///< if it is the u of a split: what v had before
+    uint16_t undo_normal = 0;    ///< the same
+    uint16_t blocked = 0;        ///< what the blocker hinders: Adaption::Blocked
 };
 
 /// The spheres and errors that a scan for work compares (criterion.h): those of the next split,
@@ -57,7 +60,9 @@ struct VertexCriteria {
     uint16_t merge_radius = kEverNeeded;
     uint8_t split_error = 0;
     uint8_t merge_error = 0;
-    static constexpr uint16_t kEverNeeded = encodeRoundedUp<11>(1 << 28);
+    static constexpr uint16_t kEverNeeded = 0x7fff;  ///< beyond all distances
+    /// Added to merge_radius: a neighbour hinders the merge, whatever the view.
+    static constexpr uint16_t kBlocked = 0x8000;
 };
 
 /// The triangles around a vertex, counter-clockwise; where the fan is open, from its beginning.
@@ -74,7 +79,6 @@ public:
     /// The base mesh. `mesh` must outlive this; validate() must find no fault.
     explicit ActiveMesh(const ProgressiveMesh& mesh);
 
-    uint32_t time = 0;  ///< for VertexPulse::changed; the caller's
     std::vector<Vertex> vertex;
     std::vector<VertexPulse> pulse;
     std::vector<VertexCriteria> criteria;
@@ -117,7 +121,7 @@ public:
     bool canUndo(uint32_t u) const {
         const OperationId last = record[u].last;
         return last != kNoOperation &&
-               (record[u].name == source_->nameOf(last) || source_->operation[last].isDummy());
+               (pulse[u].name == source_->nameOf(last) || source_->operation[last].isDummy());
     }
 
     /// Performs the next operation of v alone, and makes room for it. False, and nothing done, if
@@ -128,13 +132,12 @@ public:
     void move(uint32_t v);
     void moveBack(uint32_t v);
 
-    /// Performs the next split of v, no dummy, whose oriented star is `star`. u and the faces from
-    /// `first_face` on, one for each of the operation's ranks, are made; room for them must be
-    /// there.
-    void split(uint32_t v, const Star& star, uint32_t u, uint32_t first_face);
+    /// Performs the next split of v, no dummy, whose oriented star is `star`. u and `faces`, one
+    /// for each of the operation's ranks, the first ones, are made; room for them must be there.
+    void split(uint32_t v, const Star& star, uint32_t u, std::array<uint32_t, 2> faces);
 
     /// Undoes the split that made v and u of one. Returns the faces that are free now, kNoCorner
-    /// for none. u is free too; its record's name is kNoCorner then.
+    /// for none. u is free too; its name is kNoCorner then.
     std::array<uint32_t, 2> merge(uint32_t v, uint32_t u);
 
     /// Moves the last elements into the places of these, all different, and shrinks the arrays.
@@ -146,7 +149,7 @@ public:
 
 private:
     /// Of a neighbour: other operations may look at it, but only one has a reason to change it.
-    std::atomic_ref<uint32_t> corner(uint32_t v) { return std::atomic_ref(record[v].corner); }
+    std::atomic_ref<uint32_t> corner(uint32_t v) { return std::atomic_ref(pulse[v].corner); }
     void setVertexAt(uint32_t corner, uint32_t v) { face[corner >> 2].vertex[corner & 3] = v; }
     void setTwin(uint32_t half_edge, uint32_t other) {
         face[half_edge >> 2].twin[half_edge & 3] = other;
@@ -169,7 +172,7 @@ private:
 
 template <class Body>
 bool ActiveMesh::allNeighbours(uint32_t v, Body&& body) const {
-    const uint32_t first = record[v].corner;
+    const uint32_t first = pulse[v].corner;
     for (uint32_t c = first;;) {
         if (!body(vertexAt(nextCorner(c)))) return false;
         const uint32_t before = previousCorner(c), left = twinOf(before);
@@ -193,7 +196,7 @@ void ActiveMesh::gatherStars(std::span<const uint32_t> vertices, Star* stars,
     std::array<uint32_t, kTogether> corner, walking;
     uint32_t count = uint32_t(vertices.size());
     for (uint32_t i = 0; i < count; ++i) {
-        corner[i] = record[vertices[i]].corner;
+        corner[i] = pulse[vertices[i]].corner;
         __builtin_prefetch(&face[corner[i] >> 2]);
         stars[i].count = 0;
         walking[i] = i;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 
 #include "base/check.h"
 #include "base/parallel.h"
@@ -10,182 +9,190 @@
 namespace pietra::pmesh {
 namespace {
 
-enum State : uint8_t {
-    kMarked = 1,  ///< needed, or needed by a neighbour
-    kFresh0 = 2,  ///< marked, not looked at yet: in rounds of even, of odd number
-    kFresh1 = 4,
-    kMaySplit = 8,
-    kMayUndo = 16,  ///< its last operation is not needed
-};
-constexpr size_t kBlockVertices = 4096;
 /// Operations after which sorting may pay: what fits the second-level cache needs none.
 constexpr size_t kLeastSort = 4096;
 constexpr size_t kGrain = 256;  // operations
-constexpr auto kRelaxed = std::memory_order_relaxed;
+constexpr size_t kTogether = ActiveMesh::kTogether;
 
-/// body(v) for each v of [begin, end) whose state has one of these bits, in order.
-template <class Body>
-void forStates(std::vector<uint64_t>& states, size_t begin, size_t end, uint8_t bits, Body&& body) {
-    const uint64_t mask = 0x0101010101010101u * bits;
-    for (size_t word = begin / 8; word < (end + 7) / 8; ++word) {
-        uint64_t found = std::atomic_ref(states[word]).load(kRelaxed) & mask;
-        while (found != 0) {
-            const int k = std::countr_zero(found) / 8;
-            body(uint32_t(8 * word + size_t(k)));
-            found &= ~(uint64_t(0xff) << (8 * k));
-        }
-    }
+/// body(some, first) for at most kTogether consecutive elements at a time, in parallel.
+template <class T, class Body>
+void forSome(std::vector<T>& list, Body&& body) {
+    const auto slice = [&](size_t begin, size_t end) {
+        for (; begin < end; begin += kTogether)
+            body(std::span(list).subspan(begin, std::min(kTogether, end - begin)), begin);
+    };
+    if (list.size() <= kGrain) return slice(0, list.size());
+    parallelForSlices(list.size(), kGrain, slice);
 }
 
 }  // namespace
 
-/// Calls body(block, begin, end) for all blocks, in parallel.
-template <class Body>
-void Adaption::forBlocks(Body&& body) {
-    const size_t count = mesh_.vertexCount();
-    parallelFor(block_.size(), [&](size_t b) {
-        const size_t begin = b * kBlockVertices;
-        body(block_[b], begin, std::min(begin + kBlockVertices, count));
-    });
-}
-
-/// Calls body(v, star) for all of these, in order.
-template <class Body>
-void Adaption::forStars(std::span<const uint32_t> vertices, Body&& body) const {
-    std::array<Star, ActiveMesh::kTogether> stars;
-    for (size_t begin = 0; begin < vertices.size(); begin += stars.size()) {
-        const auto some = vertices.subspan(begin, std::min(stars.size(), vertices.size() - begin));
-        mesh_.gatherStars(some, stars.data(),
-                          [&](uint32_t w) { __builtin_prefetch(&mesh_.pulse[w]); });
-        for (size_t i = 0; i < some.size(); ++i) body(some[i], stars[i]);
+PassCounts Adaption::frame(const Criterion& criterion, int most_passes) {
+    criterion_ = criterion;
+    scan();
+    PassCounts all;
+    for (int pass = 0; pass < most_passes; ++pass) {
+        findSplits();
+        findMerges();
+        if (split_.empty() && merge_.empty()) break;
+        apply();
+        all.splits += uint32_t(split_.size());
+        all.merges += uint32_t(merge_.size());
+        ++all.passes;
     }
-}
-
-PassCounts Adaption::pass(const Criterion& criterion) {
-    ++mesh_.time;
-    blocker_.resize(mesh_.vertexCount());
-    mark(criterion);
-    for (uint32_t round = 0; isFresh(round); round ^= 1) force(round);
-    findMerges(criterion);
-    listWork();
-    applyWork();
-    const PassCounts counts{uint32_t(split_.size()), uint32_t(merge_.size())};
-    since_sort_ += counts.operations();
+    tidy();
+    since_sort_ += all.operations();
     if (since_sort_ > std::max(kLeastSort, mesh_.vertexCount())) {
         mesh_.sortInSpace();
         since_sort_ = 0;
     }
-    return counts;
+    return all;
 }
 
-int Adaption::settle(const Criterion& criterion) {
-    int passes = 1;
-    while (pass(criterion).operations() > 0) ++passes;
-    return passes;
-}
-
-void Adaption::mark(const Criterion& criterion) {
-    block_.resize((mesh_.vertexCount() + kBlockVertices - 1) / kBlockVertices);
-    states_.resize((mesh_.vertexCount() + 7) / 8);
-    forBlocks([&](Block& block, size_t begin, size_t end) {
-        uint64_t any = 0;
-        for (size_t v = begin; v < end; v += 8) {
-            uint64_t eight = 0;
-            for (size_t k = 0; k < std::min<size_t>(8, end - v); ++k) {
-                const Vertex& vertex = mesh_.vertex[v + k];
-                const VertexCriteria& criteria = mesh_.criteria[v + k];
-                const uint64_t marked =
-                    criterion.needsSplit(vertex, criteria) ? kMarked | kFresh0 : 0;
-                const uint64_t undo = criterion.needsLast(vertex, criteria) ? 0 : kMayUndo;
-                eight |= (marked | undo) << (8 * k);
+void Adaption::scan() {
+    const size_t count = mesh_.vertexCount();
+    for (VertexSet* set : {&marked_, &fresh_, &may_split_, &may_merge_, &look_for_other_}) {
+        set->clear();
+        set->resize(count);
+    }
+    parallelForSlices(marked_.words(), 64, [&](size_t begin, size_t end) {
+        for (size_t w = begin; w < end; ++w) {
+            uint64_t split = 0, merge = 0;
+            const size_t first = 64 * w, some = std::min<size_t>(64, count - first);
+            for (size_t k = 0; k < some; ++k) {
+                const Vertex& v = mesh_.vertex[first + k];
+                const VertexCriteria& c = mesh_.criteria[first + k];
+                split |= uint64_t(criterion_.needsSplit(v, c)) << k;
+                merge |= uint64_t(!criterion_.needsLast(v, c)) << k;
             }
-            states_[v / 8] = eight;
-            any |= eight;
+            marked_.insertWord(w, split);
+            fresh_.insertWord(w, split);
+            may_merge_.insertWord(w, merge);
         }
-        constexpr uint64_t kEach = 0x0101010101010101u;
-        block.fresh = {(any & kEach * kFresh0) != 0, false};
-        block.may_undo = (any & kEach * kMayUndo) != 0;
-        block.may_split = false;
-        block.merge.clear();
     });
 }
 
-bool Adaption::isFresh(uint32_t round) const {
-    return std::any_of(block_.begin(), block_.end(),
-                       [&](const Block& block) { return block.fresh[round]; });
+void Adaption::findSplits() {
+    for (fresh_.take(list_); !list_.empty(); fresh_.take(list_))
+        forSome(list_, [&](std::span<const uint32_t> some, size_t) {
+            std::array<Star, kTogether> stars;
+            mesh_.gatherStars(some, stars.data(),
+                              [&](uint32_t w) { __builtin_prefetch(&mesh_.pulse[w]); });
+            for (size_t i = 0; i < some.size(); ++i) forceAround(some[i], stars[i]);
+        });
+    may_split_.take(list_);
+    placeSplits();
 }
 
-void Adaption::force(uint32_t round) {
-    const uint8_t fresh = round == 0 ? kFresh0 : kFresh1;
-    forBlocks([&](Block& block, size_t begin, size_t end) {
-        if (!block.fresh[round]) return;
-        block.fresh[round] = false;
-        block.open.clear();
-        forStates(states_, begin, end, fresh, [&](uint32_t v) {
-            clearState(v, fresh);
-            if (isBlocked(v, kMarked)) {
-                markForced(blocker_[v].by, round ^ 1);
-            } else {
-                block.open.push_back(v);
-            }
-        });
-        forStars(block.open, [&](uint32_t v, const Star& star) {
-            if (!forceAround(v, star, round ^ 1)) return;
-            setState(v, kMaySplit);
-            block.may_split = true;
-        });
-    });
-}
-
-/// True if v may split; else marks those that must before it.
-bool Adaption::forceAround(uint32_t v, const Star& star, uint32_t next_round) {
+/// Marks those that must split before v; if there are none, v may.
+void Adaption::forceAround(uint32_t v, const Star& star) {
     const uint16_t level = mesh_.pulse[v].next_level;
     uint32_t lowest = v;
     mesh_.allNeighbours(v, star, [&](uint32_t w) {
         const uint16_t other = mesh_.pulse[w].next_level;
         DCHECK(other != level || level == kLeafLevel);
-        if (other < level) markForced(w, next_round);
+        if (other < level && marked_.insert(w)) fresh_.insert(w);
         if (other < mesh_.pulse[lowest].next_level) lowest = w;
         return true;
     });
-    if (lowest == v) return true;
-    blocker_[v] = {lowest, mesh_.time, kMarked};
-    return false;
+    if (lowest == v) {
+        may_split_.insert(v);
+    } else {
+        block(v, lowest, kSplit);
+        setBlockedInAllViews(v, false);
+    }
 }
 
-/// To be visited in `round`, the next one.
-void Adaption::markForced(uint32_t w, uint32_t round) {
-    if (stateOf(w) & kMarked) return;
-    setState(w, kMarked | (round == 0 ? kFresh0 : kFresh1));
-    std::atomic_ref(block_[w / kBlockVertices].fresh[round]).store(true, kRelaxed);
+void Adaption::block(uint32_t v, uint32_t by, Blocked what) {
+    if (mesh_.pulse[v].blocker != VertexPulse::kNoBlocker && what == kSplit &&
+        mesh_.record[v].blocked == kMergeOfOther)
+        look_for_other_.insert(v);
+    mesh_.pulse[v].blocker = mesh_.pulse[by].name;
+    mesh_.record[v].blocked = what;
 }
 
-void Adaption::findMerges(const Criterion& criterion) {
-    forBlocks([&](Block& block, size_t begin, size_t end) {
-        if (!block.may_undo) return;
-        block.open.clear();
-        forStates(states_, begin, end, kMayUndo, [&](uint32_t u) {
-            if (!(stateOf(u) & kMarked) && !isBlocked(u, kMayUndo)) block.open.push_back(u);
+/// The operation that made u must not be undone until what hinders it changes.
+void Adaption::setBlockedInAllViews(uint32_t u, bool blocked) {
+    uint16_t& radius = mesh_.criteria[u].merge_radius;
+    radius = blocked ? radius | VertexCriteria::kBlocked
+                     : radius & uint16_t(~VertexCriteria::kBlocked);
+}
+
+/// The one of this name changes.
+void Adaption::wake(uint32_t v, uint32_t name) {
+    const std::atomic_ref blocker(mesh_.pulse[v].blocker);
+    if (blocker.load(std::memory_order_relaxed) != name) return;
+    blocker.store(VertexPulse::kNoBlocker, std::memory_order_relaxed);
+    switch (mesh_.record[v].blocked) {
+        case kSplit:
+            if (marked_.contains(v)) fresh_.insert(v);
+            break;
+        case kMerge:
+            setBlockedInAllViews(v, false);
+            if (!criterion_.needsLast(mesh_.vertex[v], mesh_.criteria[v])) may_merge_.insert(v);
+            break;
+        default: look_for_other_.insert(v);
+    }
+}
+
+void Adaption::findOthers() {
+    look_for_other_.take(list_);
+    for (const uint32_t v : list_) {
+        const uint16_t level = mesh_.pulse[v].last_level;
+        mesh_.allNeighbours(v, [&](uint32_t u) {
+            if (mesh_.pulse[u].last_level != level || level == 0) return true;
+            if (mesh_.record[u].blocked == kSplit) return false;
+            setBlockedInAllViews(u, false);
+            mesh_.pulse[u].blocker = VertexPulse::kNoBlocker;
+            if (!criterion_.needsLast(mesh_.vertex[u], mesh_.criteria[u])) may_merge_.insert(u);
+            return false;
         });
-        std::vector<uint32_t> others;
-        forStars(block.open, [&](uint32_t u, const Star& star) {
-            const bool dummy = operationBefore(u).isDummy();
-            uint32_t v = dummy ? u : kNoCorner;
-            if (!allowsMerge(u, star, u, v)) return;
-            CHECK_NE(v, kNoCorner);  // or it has split again, and a neighbour has that level
-            const Operation& o = operationBefore(u);
-            const Vec3i centre = mesh_.vertex[v].position() - o.offset(0);
-            if ((stateOf(v) & kMarked) || criterion.needs(centre, o.error, o.radius)) return;
-            block.merge.push_back({v, u});
-            others.push_back(v);
-        });
-        size_t i = 0, kept = 0;
-        forStars(others, [&](uint32_t v, const Star& star) {
-            Merge& merge = block.merge[i++];
-            if (allowsMerge(v, star, merge.u, merge.v)) block.merge[kept++] = merge;
-        });
-        block.merge.resize(kept);
+    }
+}
+
+void Adaption::findMerges() {
+    findOthers();
+    may_merge_.take(list_);
+    merge_.resize(list_.size());
+    forSome(list_, [&](std::span<const uint32_t> some, size_t first) {
+        findMerges(some, std::span(merge_).subspan(first, some.size()));
     });
+    std::erase_if(merge_, [](const Merge& merge) { return merge.v == kNoCorner; });
+}
+
+void Adaption::findMerges(std::span<const uint32_t> candidates, std::span<Merge> merges) {
+    std::array<uint32_t, kTogether> ends;
+    std::array<size_t, kTogether> of;
+    std::array<Star, kTogether> stars;
+    size_t count = 0;
+    for (const uint32_t u : candidates)
+        __builtin_prefetch(&mesh_.source().operation[mesh_.record[u].last]);
+    for (size_t i = 0; i < candidates.size(); ++i) {
+        const uint32_t u = candidates[i];
+        merges[i] = {kNoCorner, u, {kNoCorner, kNoCorner}};
+        const Operation& o = mesh_.source().operation[mesh_.record[u].last];
+        const Vec3i centre = mesh_.vertex[u].position() - o.offset(o.isDummy() ? 0 : 1);
+        if (marked_.contains(u) || criterion_.needs(centre, o.error, o.radius)) continue;
+        if (o.isDummy()) merges[i].v = u;
+        of[count] = i;
+        ends[count++] = u;
+    }
+    for (int at_u = 1; at_u >= 0; --at_u) {
+        mesh_.gatherStars({ends.data(), count}, stars.data(),
+                          [&](uint32_t w) { __builtin_prefetch(&mesh_.pulse[w]); });
+        size_t kept = 0;
+        for (size_t j = 0; j < count; ++j) {
+            Merge& merge = merges[of[j]];
+            if (allowsMerge(ends[j], stars[j], merge.u, merge.v)) {
+                CHECK_NE(merge.v, kNoCorner);  // or it has split again, and a neighbour's is later
+                of[kept] = of[j];
+                ends[kept++] = merge.v;
+            } else {
+                merge.v = kNoCorner;
+            }
+        }
+        count = kept;
+    }
 }
 
 /// Whether the neighbours of an end of the operation that made u allow to undo it. Finds v.
@@ -194,35 +201,28 @@ bool Adaption::allowsMerge(uint32_t end, const Star& star, uint32_t u, uint32_t&
     return mesh_.allNeighbours(end, star, [&](uint32_t w) {
         if (w == u) return true;
         const uint16_t other = mesh_.pulse[w].last_level;
-        if (other == level) return v = w, true;
-        if (other > level) {
-            blocker_[u] = {w, mesh_.time, kMayUndo};
+        if (other > level || marked_.contains(w)) {
+            block(u, end == u ? w : end, kMerge);
+            if (end != u) block(end, w, kMergeOfOther);
+            setBlockedInAllViews(u, other > level);
             return false;
         }
-        return !(stateOf(w) & kMarked);
+        if (other == level) v = w;
+        return true;
     });
 }
 
-/// The work of all blocks in the order of the vertices, with places for what is new.
-void Adaption::listWork() {
-    split_.clear();
-    merge_.clear();
-    uint32_t u = uint32_t(mesh_.vertexCount()), face = uint32_t(mesh_.faceCount());
-    for (size_t b = 0; b < block_.size(); ++b) {
-        const Block& block = block_[b];
-        merge_.insert(merge_.end(), block.merge.begin(), block.merge.end());
-        if (!block.may_split) continue;
-        const size_t begin = b * kBlockVertices;
-        const size_t end = std::min(begin + kBlockVertices, mesh_.vertexCount());
-        forStates(states_, begin, end, kMaySplit, [&](uint32_t v) {
-            const Operation& o = mesh_.source().operation[mesh_.record[v].next];
-            split_.push_back({v, u, face});
-            if (o.isDummy()) return;
-            ++u;
-            face += (o.rankLeft() != kNoRank) + (o.rankRight() != kNoRank);
-        });
-    }
-    mesh_.resize(u, face);
+/// Free places first, then the arrays' ends.
+void Adaption::placeSplits() {
+    const size_t count = list_.size(), vertices = mesh_.vertexCount(), faces = mesh_.faceCount();
+    split_.resize(count);
+    const auto place = [](const std::vector<uint32_t>& free, size_t i, size_t end) {
+        return i < free.size() ? free[i] : uint32_t(end + i - free.size());
+    };
+    for (size_t i = 0; i < count; ++i)
+        split_[i] = {list_[i],
+                     place(free_vertex_, i, vertices),
+                     {place(free_face_, 2 * i, faces), place(free_face_, 2 * i + 1, faces)}};
 }
 
 /// What an operation between `id` and those after or before it reads, but for the star.
@@ -230,36 +230,55 @@ void Adaption::prefetch(uint32_t v, OperationId id) const {
     __builtin_prefetch(&mesh_.source().operation[id]);
     __builtin_prefetch(&mesh_.vertex[v], 1);
     __builtin_prefetch(&mesh_.criteria[v], 1);
-    __builtin_prefetch(&mesh_.pulse[v], 1);
 }
 
-void Adaption::applySplits(std::span<const Split> splits) {
-    std::array<uint32_t, ActiveMesh::kTogether> vertices;
-    std::array<Star, ActiveMesh::kTogether> stars;
+void Adaption::markIfNeeded(uint32_t v) {
+    if (criterion_.needsSplit(mesh_.vertex[v], mesh_.criteria[v])) {
+        marked_.insert(v);
+        fresh_.insert(v);
+    } else {
+        marked_.erase(v);
+    }
+}
+
+void Adaption::wakeAround(uint32_t v, const Star& star, uint32_t name) {
+    mesh_.allNeighbours(v, star, [&](uint32_t w) { return wake(w, name), true; });
+}
+
+/// Sets places that are not used to kNoCorner.
+void Adaption::applySplits(std::span<Split> splits) {
+    const std::vector<Operation>& operation = mesh_.source().operation;
+    std::array<uint32_t, kTogether> vertices;
+    std::array<Star, kTogether> stars;
     for (size_t i = 0; i < splits.size(); ++i) {
         vertices[i] = splits[i].v;
         prefetch(splits[i].v, mesh_.record[splits[i].v].next);
     }
     mesh_.gatherStars({vertices.data(), splits.size()}, stars.data(),
-                      [&](uint32_t w) { __builtin_prefetch(&mesh_.record[w]); });
+                      [&](uint32_t w) { __builtin_prefetch(&mesh_.pulse[w]); });
     for (const Split& s : splits)
-        for (const OperationId child : mesh_.source().operation[mesh_.record[s.v].next].child)
-            if (child != kNoOperation) __builtin_prefetch(&mesh_.source().operation[child]);
+        for (const OperationId child : operation[mesh_.record[s.v].next].child)
+            if (child != kNoOperation) __builtin_prefetch(&operation[child]);
     for (size_t i = 0; i < splits.size(); ++i) {
-        const Split& s = splits[i];
-        if (mesh_.source().operation[mesh_.record[s.v].next].isDummy()) {
+        Split& s = splits[i];
+        const Operation& o = operation[mesh_.record[s.v].next];
+        wakeAround(s.v, stars[i], mesh_.pulse[s.v].name);
+        if (o.isDummy()) {
             mesh_.move(s.v);
+            s = {s.v, kNoCorner, {kNoCorner, kNoCorner}};
         } else {
             CHECK(mesh_.orient(stars[i]));
             mesh_.split(s.v, stars[i], s.u, s.face);
+            markIfNeeded(s.u);
+            if (o.rankLeft() == kNoRank || o.rankRight() == kNoRank) s.face[1] = kNoCorner;
         }
+        markIfNeeded(s.v);
     }
 }
 
-/// `first`: the place of the first of these in the list.
-void Adaption::applyMerges(std::span<const Merge> merges, size_t first) {
-    std::array<uint32_t, ActiveMesh::kTogether> vertices;
-    std::array<Star, ActiveMesh::kTogether> stars;
+void Adaption::applyMerges(std::span<Merge> merges) {
+    std::array<uint32_t, kTogether> vertices;
+    std::array<Star, kTogether> stars;
     for (size_t i = 0; i < merges.size(); ++i) {
         vertices[i] = merges[i].u;
         prefetch(merges[i].v, mesh_.record[merges[i].u].last);
@@ -270,36 +289,60 @@ void Adaption::applyMerges(std::span<const Merge> merges, size_t first) {
         const OperationId before = mesh_.record[m.u].undo_last;
         if (before != kNoOperation) __builtin_prefetch(&mesh_.source().operation[before]);
     }
-    for (size_t i = 0; i < merges.size(); ++i) {
-        const auto [v, u] = merges[i];
-        std::array<uint32_t, 2> faces{kNoCorner, kNoCorner};
-        if (u == v) {
-            mesh_.moveBack(v);
-        } else {
-            faces = mesh_.merge(v, u);
-        }
-        free_vertex_[first + i] = u == v ? kNoCorner : u;
-        free_face_[2 * (first + i)] = faces[0];
-        free_face_[2 * (first + i) + 1] = faces[1];
+    for (Merge& m : merges) applyMerge(m);
+}
+
+void Adaption::applyMerge(Merge& m) {
+    const uint32_t name = mesh_.pulse[m.v].name, other = mesh_.pulse[m.u].name;
+    if (m.u == m.v) {
+        mesh_.moveBack(m.v);
+        m.u = kNoCorner;
+    } else {
+        m.face = mesh_.merge(m.v, m.u);
+    }
+    mesh_.allNeighbours(m.v, [&](uint32_t w) {
+        wake(w, name);
+        wake(w, other);
+        return true;
+    });
+    if (!criterion_.needsLast(mesh_.vertex[m.v], mesh_.criteria[m.v])) may_merge_.insert(m.v);
+}
+
+void Adaption::apply() {
+    const size_t splits = split_.size();
+    const auto beyond = [](size_t wanted, const std::vector<uint32_t>& free) {
+        return wanted - std::min(wanted, free.size());
+    };
+    mesh_.resize(mesh_.vertexCount() + beyond(splits, free_vertex_),
+                 mesh_.faceCount() + beyond(2 * splits, free_face_));
+    for (VertexSet* set : {&marked_, &fresh_, &may_split_, &may_merge_, &look_for_other_})
+        set->resize(mesh_.vertexCount());
+    const std::vector<Split> places = split_;
+    forSome(split_, [&](std::span<Split> some, size_t) { applySplits(some); });
+    forSome(merge_, [&](std::span<Merge> some, size_t) { applyMerges(some); });
+
+    free_vertex_.erase(free_vertex_.begin(),
+                       free_vertex_.begin() + ptrdiff_t(std::min(splits, free_vertex_.size())));
+    free_face_.erase(free_face_.begin(),
+                     free_face_.begin() + ptrdiff_t(std::min(2 * splits, free_face_.size())));
+    for (size_t i = 0; i < splits; ++i) {
+        if (split_[i].u == kNoCorner) free_vertex_.push_back(places[i].u);
+        for (const size_t k : {0, 1})
+            if (split_[i].face[k] == kNoCorner) free_face_.push_back(places[i].face[k]);
+    }
+    for (const Merge& m : merge_) {
+        if (m.u != kNoCorner) free_vertex_.push_back(m.u);
+        for (const uint32_t f : m.face)
+            if (f != kNoCorner) free_face_.push_back(f);
     }
 }
 
-void Adaption::applyWork() {
-    static constexpr size_t kTogether = ActiveMesh::kTogether;
-    const auto forSome = [](const auto& list, auto&& body) {
-        parallelForSlices(list.size(), kGrain, [&](size_t begin, size_t end) {
-            for (; begin < end; begin += kTogether)
-                body(std::span(list).subspan(begin, std::min(kTogether, end - begin)), begin);
-        });
-    };
-    forSome(split_, [&](std::span<const Split> splits, size_t) { applySplits(splits); });
-    if (merge_.empty()) return;
-    free_vertex_.resize(merge_.size());
-    free_face_.resize(2 * merge_.size());
-    forSome(merge_, [&](std::span<const Merge> m, size_t first) { applyMerges(m, first); });
-    std::erase(free_vertex_, kNoCorner);
-    std::erase(free_face_, kNoCorner);
-    mesh_.fillHoles(free_vertex_, free_face_);
+/// No place is left free.
+void Adaption::tidy() {
+    findOthers();
+    if (!free_vertex_.empty() || !free_face_.empty()) mesh_.fillHoles(free_vertex_, free_face_);
+    free_vertex_.clear();
+    free_face_.clear();
 }
 
 }  // namespace pietra::pmesh

@@ -124,6 +124,7 @@ uint64_t hashOf(const ActiveMesh& mesh) {
     add(mesh.face);
     add(mesh.pulse);
     add(mesh.record);
+    add(mesh.criteria);
     return hash;
 }
 

@@ -30,7 +30,8 @@ struct Criterion {
     }
     /// False only if the operation that the vertex came from is not needed, maybe.
     bool needsLast(const Vertex& v, const VertexCriteria& c) const {
-        return needs(v.position(), c.merge_error, c.merge_radius);
+        return c.merge_radius >= VertexCriteria::kBlocked ||
+               needs(v.position(), c.merge_error, c.merge_radius);
     }
 };
 

@@ -152,7 +152,7 @@ void Encoder::encodeStars() {
     }
     counts_.name_of = slot_of_;
     for (uint32_t& name : counts_.name_of)
-        if (name != kNoVertex) name = active.record[name].name;
+        if (name != kNoVertex) name = active.pulse[name].name;
 }
 
 /// Moves v to where it is to be, as far as sixteen bits reach.
@@ -193,7 +193,7 @@ void Encoder::encode(ActiveMesh& active, OperationId id, const CollapseRecord& r
     o.error = errorCode(double(r.deviation) / double(1 << shift_));
     const uint32_t face = uint32_t(active.faceCount());
     active.resize(u + 1, face + (left != kNoRank) + (right != kNoRank));
-    active.split(v, star, u, face);
+    active.split(v, star, u, {face, face + 1});
     slot_of_[r.u] = u;
 }
 

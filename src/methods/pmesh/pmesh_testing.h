@@ -107,7 +107,7 @@ inline std::vector<Triangle> namedTriangles(const ActiveMesh& mesh) {
     std::vector<Triangle> triangles;
     for (uint32_t f = 0; f < mesh.faceCount(); ++f) {
         Triangle t;
-        for (uint32_t k = 0; k < 3; ++k) t[k] = mesh.record[mesh.vertexAt(4 * f + k)].name;
+        for (uint32_t k = 0; k < 3; ++k) t[k] = mesh.pulse[mesh.vertexAt(4 * f + k)].name;
         std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
         triangles.push_back(t);
     }
@@ -122,7 +122,7 @@ inline std::vector<std::pair<uint32_t, std::array<uint32_t, 4>>> namedVertices(
     for (uint32_t v = 0; v < mesh.vertexCount(); ++v) {
         const Vertex& p = mesh.vertex[v];
         vertices.push_back(
-            {mesh.record[v].name, {uint32_t(p.x), uint32_t(p.y), uint32_t(p.z), p.normal}});
+            {mesh.pulse[v].name, {uint32_t(p.x), uint32_t(p.y), uint32_t(p.z), p.normal}});
     }
     std::sort(vertices.begin(), vertices.end());
     return vertices;
@@ -195,16 +195,16 @@ inline void expectSound(const ActiveMesh& mesh) {
         EXPECT_EQ(mesh.pulse[v].last_level,
                   r.last == none ? 0u : mesh.source().operation[r.last].level + 1u);
         if (r.next == none && r.last == none) continue;  // may be irregular
-        ASSERT_NE(r.corner, kNoCorner);
-        EXPECT_EQ(mesh.vertexAt(r.corner), v);
+        ASSERT_NE(mesh.pulse[v].corner, kNoCorner);
+        EXPECT_EQ(mesh.vertexAt(mesh.pulse[v].corner), v);
         uint32_t reached = 0;
         bool closed = false;
-        for (uint32_t c = r.corner; c != kNoCorner && !closed; closed = c == r.corner) {
+        for (uint32_t c = mesh.pulse[v].corner; c != kNoCorner && !closed; closed = c == mesh.pulse[v].corner) {
             ++reached;
             c = mesh.leftOf(c);
         }
         EXPECT_EQ(reached, corners[v]);
-        EXPECT_TRUE(closed || mesh.twinOf(r.corner) == kNoCorner) << "not the first corner";
+        EXPECT_TRUE(closed || mesh.twinOf(mesh.pulse[v].corner) == kNoCorner) << "not the first corner";
         mesh.allNeighbours(v, [&](uint32_t w) {
             const uint16_t level = mesh.pulse[w].next_level;
             EXPECT_TRUE(level != mesh.pulse[v].next_level || level == kLeafLevel) << "equal levels";
