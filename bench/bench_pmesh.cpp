@@ -29,6 +29,12 @@ double now() {
     return double(t.tv_sec) + double(t.tv_nsec) * 1e-9;
 }
 
+double wallNow() {
+    timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return double(t.tv_sec) + double(t.tv_nsec) * 1e-9;
+}
+
 void report(const ProgressiveMesh& mesh, const BuildCounts& counts, double seconds) {
     std::printf(
         "  built in %.2f s: base %zu vertices, %zu triangles; %zu operations, %llu dummies;"
@@ -104,6 +110,33 @@ void hover(Adaption& adaption, const Box3d& box, const Lattice& lattice, int job
         adaption.mesh().vertexCount(), double(operations) / 100, ns[50], ns[90]);
 }
 
+/// A camera that rushes to and fro while it circles: each frame until nothing is left to do.
+void storm(Adaption& adaption, const Box3d& box, const Lattice& lattice, double pixels) {
+    const auto view = [&](int frame) {
+        const double t = std::abs(frame % 24 - 12) / 12.0;
+        return viewFrom(box, lattice, 0.02 * frame, 0.4 + 0.8 * t, pixels);
+    };
+    adaption.settle(view(0));
+    uint64_t operations = 0, passes = 0, vertices = 0;
+    uint32_t least = ~0u;
+    const int frames = 48;
+    const double begin = now(), wall = wallNow();
+    for (int frame = 1; frame <= frames; ++frame) {
+        const PassCounts counts = adaption.settle(view(frame));
+        operations += counts.operations();
+        passes += counts.passes;
+        vertices += adaption.mesh().vertexCount();
+        least = std::min(least, counts.operations());
+    }
+    std::printf(
+        "  storm at %.2f px: %llu vertices, %llu operations a frame (at least %u), %.1f passes:"
+        " %.2f M operations/s of processor, %.2f M/s\n",
+        pixels, static_cast<unsigned long long>(vertices / frames),
+        static_cast<unsigned long long>(operations / frames), least, double(passes) / frames,
+        double(operations) / (now() - begin) * 1e-6,
+        double(operations) / (wallNow() - wall) * 1e-6);
+}
+
 void run(const char* path, int jobs) {
     Budget budget(size_t(8) << 30);
     TempSpace space{"/tmp", &budget, size_t(1) << 30};
@@ -125,6 +158,7 @@ void run(const char* path, int jobs) {
     }
     fly(adaption, box, mesh.lattice, jobs);
     hover(adaption, box, mesh.lattice, jobs);
+    for (const double pixels : {1.0, 0.5, 0.25}) storm(adaption, box, mesh.lattice, pixels);
 }
 
 }  // namespace

@@ -76,8 +76,16 @@ ActiveMesh::ActiveMesh(const ProgressiveMesh& mesh) : source_(&mesh) {
     face.resize(mesh.base_triangle.size());
     for (uint32_t f = 0; f < face.size(); ++f)
         for (uint32_t k = 0; k < 3; ++k) {
-            face[f].vertex[k] = mesh.base_triangle[f][k];
-            face[f].twin[k] = edges.twin[3 * f + k];
+            setVertexAt(4 * f + k, mesh.base_triangle[f][k]);
+            setTwin(4 * f + k, edges.twin[3 * f + k]);
+        }
+    for (const ActiveFace& f : face)
+        for (uint32_t k = 0; k < 3; ++k) {
+            // An edge is met once in each direction, but at a border.
+            const uint32_t v = f.vertex[k], w = f.vertex[k + 1];
+            pulse[v].around += pulse[w].weightOn(pulse[v]);
+            const bool border = f.left[(k + 1) % 3] == kNoCorner;
+            if (border) pulse[w].around += pulse[v].weightOn(pulse[w]);
         }
 }
 
@@ -91,7 +99,6 @@ void ActiveMesh::resize(size_t vertices, size_t faces) {
 
 void ActiveMesh::setNext(uint32_t v, OperationId next) {
     record[v].next = next;
-    pulse[v].blocker = VertexPulse::kNoBlocker;
     const bool none = next == kNoOperation;
     pulse[v].next_level = none ? uint16_t(kLeafLevel) : source_->operation[next].level;
     criteria[v].split_radius = none ? uint16_t(0) : source_->operation[next].radius;
@@ -113,10 +120,14 @@ bool ActiveMesh::orient(Star& star) const {
     if (!star.closed) return true;
     uint32_t least = 0, least_name = ~0u;
     for (uint32_t i = 0; i < star.count; ++i) {
-        const uint32_t name = pulse[neighbour(star, i)].name;
+        const uint32_t name = pulse[star.neighbour[i]].name;
         if (name < least_name) least = i, least_name = name;
     }
-    std::rotate(star.corner.begin(), star.corner.begin() + least, star.corner.begin() + star.count);
+    const auto rotate = [&](auto& ring) {
+        std::rotate(ring.begin(), ring.begin() + least, ring.begin() + star.count);
+    };
+    rotate(star.corner);
+    rotate(star.neighbour);
     return true;
 }
 
@@ -135,28 +146,43 @@ uint32_t ActiveMesh::firstCorner(uint32_t corner) const {
     }
 }
 
-void ActiveMesh::move(uint32_t v) {
+/// v alone has changed its levels.
+void ActiveMesh::changeAround(uint32_t v, const Star& star, const VertexPulse& before) {
+    const VertexPulse& after = pulse[v];
+    uint32_t around = 0;
+    for (const uint32_t w : star.ring()) {
+        addAround(w, after.weightOn(pulse[w]) - before.weightOn(pulse[w]));
+        around += pulse[w].weightOn(after);
+    }
+    pulse[v].around = around;
+}
+
+void ActiveMesh::move(uint32_t v, const Star& star) {
+    const VertexPulse before = pulse[v];
     const OperationId id = record[v].next;
     const Operation& o = source_->operation[id];
     vertex[v].moveBy(o.offset(0));
     setLast(v, id);
     setNext(v, o.child[0]);
+    changeAround(v, star, before);
 }
 
-void ActiveMesh::moveBack(uint32_t v) {
+void ActiveMesh::moveBack(uint32_t v, const Star& star) {
+    const VertexPulse before = pulse[v];
     const OperationId id = record[v].last;
     const Operation& o = source_->operation[id];
     vertex[v].moveBy(-o.offset(0));
     setLast(v, o.child[1]);
     setNext(v, id);
+    changeAround(v, star, before);
 }
 
 bool ActiveMesh::apply(uint32_t v) {
     const Operation& o = source_->operation[record[v].next];
-    if (o.isDummy()) return move(v), true;
     Star star;
     gatherStars({&v, 1}, &star, [](uint32_t) {});
     if (!orient(star)) return false;
+    if (o.isDummy()) return move(v, star), true;
     const uint32_t faces = (o.rankLeft() != kNoRank) + (o.rankRight() != kNoRank);
     for (const uint32_t rank : {o.rankLeft(), o.rankRight()})
         if (rank != kNoRank && rank >= star.neighbours()) return false;
@@ -167,8 +193,8 @@ bool ActiveMesh::apply(uint32_t v) {
     return true;
 }
 
-void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u,
-                       std::array<uint32_t, 2> faces) {
+std::array<uint32_t, 2> ActiveMesh::split(uint32_t v, const Star& star, uint32_t u,
+                                          std::array<uint32_t, 2> faces) {
     const OperationId id = record[v].next;
     const Operation& o = source_->operation[id];
     const uint32_t n = star.count, l = o.rankLeft(), r = o.rankRight();
@@ -178,8 +204,8 @@ void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u,
         if (i < n) return star.corner[i];
         return star.closed ? star.corner[i == n ? 0 : n - 1] : kNoCorner;
     };
-    const uint32_t vl = has_left ? neighbour(star, l) : 0;
-    const uint32_t vr = has_right ? neighbour(star, r) : 0;
+    const uint32_t vl = has_left ? star.neighbour[l] : 0;
+    const uint32_t vr = has_right ? star.neighbour[r] : 0;
 
     const uint32_t begin = has_right ? r : 0, end = has_left ? l : n;
     for (uint32_t i = begin, left = end >= begin ? end - begin : n - begin + end; left > 0;
@@ -190,7 +216,7 @@ void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u,
     const uint32_t fl = 4 * faces[0], fr = 4 * faces[has_left ? 1 : 0];
     if (has_left) {
         const uint32_t of_u = triangle(l - 1), of_v = triangle(l);
-        face[fl >> 2].vertex = {v, u, vl, 0};
+        face[fl >> 2].vertex = {v, u, vl, v};
         link(fl, has_right ? fr : kNoCorner);
         link(fl + 1, of_u == kNoCorner ? kNoCorner : previousCorner(of_u));
         link(fl + 2, of_v);
@@ -198,12 +224,13 @@ void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u,
     }
     if (has_right) {
         const uint32_t of_v = triangle(r - 1), of_u = triangle(r);
-        face[fr >> 2].vertex = {u, v, vr, 0};
+        face[fr >> 2].vertex = {u, v, vr, u};
         if (!has_left) link(fr, kNoCorner);
         link(fr + 1, of_v == kNoCorner ? kNoCorner : previousCorner(of_v));
         link(fr + 2, of_u);
         if (of_u == kNoCorner) corner(vr).store(fr + 2, kRelaxed);
     }
+    const VertexPulse before = pulse[v];
     VertexPulse& a = pulse[v];
     VertexPulse& b = pulse[u];
     a.corner = has_left ? fl : fr + 1;
@@ -222,32 +249,56 @@ void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u,
     setLast(u, id);
     setNext(v, o.child[0]);
     setNext(u, o.child[1]);
+
+    // Counter-clockwise, from vr to vl lie u's neighbours, from vl to vr those of v.
+    const uint32_t ring = star.neighbours();
+    const auto arc = [ring](uint32_t from, uint32_t to) {  // both included
+        const uint32_t until = (2u << to) - 1, before_from = (1u << from) - 1;
+        return from <= to ? until & ~before_from : ((1u << ring) - 1) & (until | ~before_from);
+    };
+    const uint32_t of_v = arc(has_left ? l : 0, has_right ? r : ring - 1);
+    const uint32_t of_u = arc(has_right ? r : 0, has_left ? l : ring - 1);
+    uint32_t around_v = b.weightOn(a), around_u = a.weightOn(b);
+    for (uint32_t i = 0; i < ring; ++i) {
+        const VertexPulse& p = pulse[star.neighbour[i]];
+        const uint32_t at_v = 0 - (of_v >> i & 1), at_u = 0 - (of_u >> i & 1);
+        around_v += p.weightOn(a) & at_v;
+        around_u += p.weightOn(b) & at_u;
+        addAround(star.neighbour[i],
+                  (a.weightOn(p) & at_v) + (b.weightOn(p) & at_u) - before.weightOn(p));
+    }
+    a.around = around_v;
+    b.around = around_u;
+    return {of_v, of_u};
 }
 
-std::array<uint32_t, 2> ActiveMesh::merge(uint32_t v, uint32_t u) {
+std::array<uint32_t, 2> ActiveMesh::merge(uint32_t v, const Star& star, uint32_t u,
+                                          const Star& other) {
     VertexPulse& a = pulse[v];
     VertexPulse& b = pulse[u];
-    const bool open = twinOf(a.corner) == kNoCorner || twinOf(b.corner) == kNoCorner;
-    uint32_t fl = kNoCorner, fr = kNoCorner;  // their first corners: of v, of u
-    for (uint32_t c = b.corner; c != kNoCorner;) {
-        setVertexAt(c, v);
-        if (vertexAt(previousCorner(c)) == v) fl = previousCorner(c);
-        if (vertexAt(nextCorner(c)) == v) fr = c;
-        c = leftOf(c);
-        if (c == b.corner) break;
-    }
-    uint32_t stays = kNoCorner;
-    if (fl != kNoCorner) {
-        const uint32_t of_u = twinOf(fl + 1), of_v = twinOf(fl + 2), vl = vertexAt(fl + 2);
+    const VertexPulse before = a;
+    const bool open = !star.closed || !other.closed;
+    const uint32_t n = other.count, ring = other.neighbours();
+    uint32_t at = 0;
+    while (other.neighbour[at] != v) ++at;
+    for (uint32_t i = 0; i < n; ++i) setVertexAt(other.corner[i], v);
+    const bool has_left = other.closed || at > 0, has_right = other.closed || at < n;
+    const uint32_t fl = has_left ? previousCorner(other.corner[(at + n - 1) % n]) : kNoCorner;
+    const uint32_t fr = has_right ? other.corner[at] : kNoCorner;
+    uint32_t stays = kNoCorner, vl = kNoCorner, vr = kNoCorner;
+    if (has_left) {
+        const uint32_t of_u = twinOf(fl + 1), of_v = twinOf(fl + 2);
+        vl = vertexAt(fl + 2);
         link(of_u, of_v);
         if (corner(vl).load(kRelaxed) == fl + 2) corner(vl).store(of_u, kRelaxed);
         stays = of_v != kNoCorner ? of_v : nextCorner(of_u);
     }
-    if (fr != kNoCorner) {
-        const uint32_t of_v = twinOf(fr + 1), of_u = twinOf(fr + 2), vr = vertexAt(fr + 2);
+    if (has_right) {
+        const uint32_t of_v = twinOf(fr + 1), of_u = twinOf(fr + 2);
+        vr = vertexAt(fr + 2);
         link(of_v, of_u);
         if (corner(vr).load(kRelaxed) == fr + 2) corner(vr).store(of_v, kRelaxed);
-        if (fl == kNoCorner) stays = of_u != kNoCorner ? of_u : nextCorner(of_v);
+        if (!has_left) stays = of_u != kNoCorner ? of_u : nextCorner(of_v);
     }
     a.corner = open ? firstCorner(stays) : stays;
 
@@ -256,6 +307,21 @@ std::array<uint32_t, 2> ActiveMesh::merge(uint32_t v, uint32_t u) {
     vertex[v].normal = record[u].undo_normal;
     setLast(v, record[u].undo_last);
     setNext(v, id);
+
+    uint32_t around = 0;
+    for (const uint32_t w : star.ring()) {
+        if (w == u) continue;
+        addAround(w, a.weightOn(pulse[w]) - before.weightOn(pulse[w]));
+        around += pulse[w].weightOn(a);
+    }
+    for (uint32_t i = 0; i < ring; ++i) {
+        const uint32_t w = other.neighbour[i];
+        if (w == v) continue;
+        const bool new_at_v = w != vl && w != vr;
+        addAround(w, (new_at_v ? a.weightOn(pulse[w]) : 0) - b.weightOn(pulse[w]));
+        if (new_at_v) around += pulse[w].weightOn(a);
+    }
+    a.around = around;
     b.name = kNoCorner;
     return {fl == kNoCorner ? fl : fl >> 2, fr == kNoCorner ? fr : fr >> 2};
 }
@@ -345,8 +411,8 @@ void ActiveMesh::sortInSpace() {
     parallelForSlices(faceCount(), 16 * kGrain, [&](size_t begin, size_t end) {
         for (size_t f = begin; f < end; ++f)
             for (size_t k = 0; k < 3; ++k) {
-                face[f].vertex[k] = place[face[f].vertex[k]];
-                moved(face[f].twin[k]);
+                setVertexAt(uint32_t(4 * f + k), place[face[f].vertex[k]]);
+                moved(face[f].left[k]);
             }
     });
     for (VertexPulse& p : pulse) moved(p.corner);

@@ -25,21 +25,33 @@
 
 namespace pietra::pmesh {
 
-/// A triangle: its corners, and the half-edges opposite to those that begin at them, or kNoCorner.
+/// A triangle: its corners, the first once more at the end; and for each the corner at the same vertex
+/// in the next triangle counter-clockwise, or kNoCorner.
 struct alignas(32) ActiveFace {
-    std::array<uint32_t, 4> vertex{};  ///< the fourth is padding
-    std::array<uint32_t, 4> twin{};
+    std::array<uint32_t, 4> vertex{};
+    std::array<uint32_t, 4> left{};  ///< the fourth is padding
     bool operator==(const ActiveFace&) const = default;
 };
 
 /// What a vertex's neighbours look at.
 struct alignas(16) VertexPulse {
     uint32_t name;
-    uint32_t corner;               ///< one of its corners; where the fan is open, the first
-    uint32_t blocker = kNoBlocker; ///< the name of a neighbour, for Adaption
-    uint16_t next_level;           ///< of the next split, or kLeafLevel
-    uint16_t last_level;           ///< 1 + that of the last, or 0; equal only for v and u of one split
-    static constexpr uint32_t kNoBlocker = ~0u;
+    uint32_t corner;      ///< one of its corners; where the fan is open, the first
+    uint16_t next_level;  ///< of the next split, or kLeafLevel
+    uint16_t last_level;  ///< 1 + that of the last, or 0; equal only for v and u of one split
+    /// How many neighbours' next levels are lower: these must split before; and, in the upper half,
+    /// how many neighbours' last levels are higher: these must merge before.
+    uint32_t around = 0;
+    uint32_t lower() const { return loadAround() & 0xffff; }
+    uint32_t higher() const { return loadAround() >> 16; }
+    uint32_t loadAround() const {
+        return std::atomic_ref(const_cast<uint32_t&>(around)).load(std::memory_order_relaxed);
+    }
+    /// What it adds to `around` of a neighbour.
+    uint32_t weightOn(const VertexPulse& neighbour) const {
+        return uint32_t(next_level < neighbour.next_level) |
+               uint32_t(last_level > neighbour.last_level) << 16;
+    }
     bool operator==(const VertexPulse&) const = default;
 };
 
@@ -48,8 +60,7 @@ struct alignas(16) VertexRecord {
     OperationId next;            ///< its next split, or kNoOperation
     OperationId last;            ///< the split it came from last, or kNoOperation
     OperationId undo_last = 0;   ///< if it is the u of a split: what v had before
-    uint16_t undo_normal = 0;    ///< the same
-    uint16_t blocked = 0;        ///< what the blocker hinders: Adaption::Blocked
+    uint32_t undo_normal = 0;    ///< the same
 };
 
 /// The spheres and errors that a scan for work compares (criterion.h): those of the next split,
@@ -68,10 +79,12 @@ struct VertexCriteria {
 /// The triangles around a vertex, counter-clockwise; where the fan is open, from its beginning.
 struct Star {
     static constexpr uint32_t kRoom = 24;
-    uint32_t count = 0;  ///< 0: more than there is room for
+    uint32_t count = 0;  ///< of corners; 0: more than there is room for
     bool closed = false;
     std::array<uint32_t, kRoom> corner;  ///< at the vertex
+    std::array<uint32_t, kRoom + 1> neighbour;
     uint32_t neighbours() const { return closed ? count : count + 1; }
+    std::span<const uint32_t> ring() const { return {neighbour.data(), neighbours()}; }
 };
 
 class ActiveMesh {
@@ -91,18 +104,14 @@ public:
     void resize(size_t vertices, size_t faces);
 
     uint32_t vertexAt(uint32_t corner) const { return face[corner >> 2].vertex[corner & 3]; }
-    uint32_t twinOf(uint32_t half_edge) const { return face[half_edge >> 2].twin[half_edge & 3]; }
     /// The corner at the same vertex in the next face counter-clockwise, or kNoCorner.
-    uint32_t leftOf(uint32_t corner) const { return twinOf(previousCorner(corner)); }
+    uint32_t leftOf(uint32_t corner) const { return face[corner >> 2].left[corner & 3]; }
+    uint32_t twinOf(uint32_t half_edge) const { return leftOf(nextCorner(half_edge)); }
 
     /// body(w) for each neighbour w of v, until it returns false; false then. v must not be
     /// irregular.
     template <class Body>
     bool allNeighbours(uint32_t v, Body&& body) const;
-
-    /// The same of v's star as gathered.
-    template <class Body>
-    bool allNeighbours(uint32_t v, const Star& star, Body&& body) const;
 
     /// Walks around several vertices in step, so that what one waits for, others use. At most
     /// kTogether at a time; prefetch(w) is called for each neighbour. Stars begin anywhere.
@@ -113,10 +122,6 @@ public:
     /// Turns the star of a vertex that is to split so that ranks count from its beginning: where it
     /// is closed, at the neighbour of the least name. False if it has too many neighbours.
     [[nodiscard]] bool orient(Star& star) const;
-    uint32_t neighbour(const Star& star, uint32_t rank) const {
-        return rank < star.count ? vertexAt(nextCorner(star.corner[rank]))
-                                 : vertexAt(previousCorner(star.corner[star.count - 1]));
-    }
     /// The operation that `u` came from last made it, or is a dummy: it is undone from here.
     bool canUndo(uint32_t u) const {
         const OperationId last = record[u].last;
@@ -129,16 +134,17 @@ public:
     [[nodiscard]] bool apply(uint32_t v);
 
     /// Performs the next operation of v, a dummy; undoes its last, one too.
-    void move(uint32_t v);
-    void moveBack(uint32_t v);
+    void move(uint32_t v, const Star& star);
+    void moveBack(uint32_t v, const Star& star);
 
     /// Performs the next split of v, no dummy, whose oriented star is `star`. u and `faces`, one
     /// for each of the operation's ranks, the first ones, are made; room for them must be there.
-    void split(uint32_t v, const Star& star, uint32_t u, std::array<uint32_t, 2> faces);
+    /// Returns which neighbours are v's now, and which u's: a bit each, in the star's order.
+    std::array<uint32_t, 2> split(uint32_t v, const Star& star, uint32_t u, std::array<uint32_t, 2> faces);
 
-    /// Undoes the split that made v and u of one. Returns the faces that are free now, kNoCorner
-    /// for none. u is free too; its name is kNoCorner then.
-    std::array<uint32_t, 2> merge(uint32_t v, uint32_t u);
+    /// Undoes the split that made v and u of one, whose stars are these. Returns the faces that are
+    /// free now, kNoCorner for none. u is free too; its name is kNoCorner then.
+    std::array<uint32_t, 2> merge(uint32_t v, const Star& star, uint32_t u, const Star& other);
 
     /// Moves the last elements into the places of these, all different, and shrinks the arrays.
     void fillHoles(std::vector<uint32_t>& free_vertices, std::vector<uint32_t>& free_faces);
@@ -150,10 +156,20 @@ public:
 private:
     /// Of a neighbour: other operations may look at it, but only one has a reason to change it.
     std::atomic_ref<uint32_t> corner(uint32_t v) { return std::atomic_ref(pulse[v].corner); }
-    void setVertexAt(uint32_t corner, uint32_t v) { face[corner >> 2].vertex[corner & 3] = v; }
-    void setTwin(uint32_t half_edge, uint32_t other) {
-        face[half_edge >> 2].twin[half_edge & 3] = other;
+    void setVertexAt(uint32_t corner, uint32_t v) {
+        ActiveFace& f = face[corner >> 2];
+        f.vertex[corner & 3] = v;
+        if ((corner & 3) == 0) f.vertex[3] = v;
     }
+    void setTwin(uint32_t half_edge, uint32_t other) {
+        const uint32_t corner = nextCorner(half_edge);
+        face[corner >> 2].left[corner & 3] = other;
+    }
+    /// Of a neighbour of several vertices that change at once.
+    void addAround(uint32_t v, uint32_t weight) {
+        std::atomic_ref(pulse[v].around).fetch_add(weight, std::memory_order_relaxed);
+    }
+    void changeAround(uint32_t v, const Star& star, const VertexPulse& before);
     void setNext(uint32_t v, OperationId next);
     void setLast(uint32_t v, OperationId last);
     void link(uint32_t half_edge, uint32_t other);
@@ -182,14 +198,6 @@ bool ActiveMesh::allNeighbours(uint32_t v, Body&& body) const {
     }
 }
 
-template <class Body>
-bool ActiveMesh::allNeighbours(uint32_t v, const Star& star, Body&& body) const {
-    if (star.count == 0) return allNeighbours(v, body);
-    for (uint32_t rank = 0; rank < star.neighbours(); ++rank)
-        if (!body(neighbour(star, rank))) return false;
-    return true;
-}
-
 template <class Prefetch>
 void ActiveMesh::gatherStars(std::span<const uint32_t> vertices, Star* stars,
                              Prefetch&& prefetch) const {
@@ -205,12 +213,20 @@ void ActiveMesh::gatherStars(std::span<const uint32_t> vertices, Star* stars,
         uint32_t still = 0;
         for (uint32_t j = 0; j < count; ++j) {
             const uint32_t i = walking[j], c = corner[i];
+            const ActiveFace& f = face[c >> 2];
             Star& star = stars[i];
-            star.corner[star.count++] = c;
-            prefetch(vertexAt(nextCorner(c)));
-            corner[i] = leftOf(c);
+            const uint32_t w = f.vertex[(c & 3) + 1];
+            star.corner[star.count] = c;
+            star.neighbour[star.count++] = w;
+            prefetch(w);
+            corner[i] = f.left[c & 3];
             star.closed = corner[i] == star.corner[0];
-            if (star.closed || corner[i] == kNoCorner) continue;
+            if (star.closed) continue;
+            if (corner[i] == kNoCorner) {
+                star.neighbour[star.count] = vertexAt(previousCorner(c));
+                prefetch(star.neighbour[star.count]);
+                continue;
+            }
             if (star.count == Star::kRoom) {
                 star.count = 0;
                 continue;

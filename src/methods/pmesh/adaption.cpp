@@ -51,7 +51,7 @@ PassCounts Adaption::frame(const Criterion& criterion, int most_passes) {
 
 void Adaption::scan() {
     const size_t count = mesh_.vertexCount();
-    for (VertexSet* set : {&marked_, &fresh_, &may_split_, &may_merge_, &look_for_other_}) {
+    for (VertexSet* set : {&marked_, &fresh_, &may_split_, &released_, &may_merge_}) {
         set->clear();
         set->resize(count);
     }
@@ -72,144 +72,47 @@ void Adaption::scan() {
     });
 }
 
+void Adaption::gather(Some vertices, Star* stars) const {
+    mesh_.gatherStars(vertices, stars, [&](uint32_t w) { __builtin_prefetch(&mesh_.pulse[w]); });
+}
+
+void Adaption::mark(uint32_t v) {
+    if (marked_.insert(v)) fresh_.insert(v);
+}
+
 void Adaption::findSplits() {
     for (fresh_.take(list_); !list_.empty(); fresh_.take(list_))
-        forSome(list_, [&](std::span<const uint32_t> some, size_t) {
-            std::array<Star, kTogether> stars;
-            mesh_.gatherStars(some, stars.data(),
-                              [&](uint32_t w) { __builtin_prefetch(&mesh_.pulse[w]); });
-            for (size_t i = 0; i < some.size(); ++i) forceAround(some[i], stars[i]);
-        });
+        forSome(list_, [&](Some some, size_t) { findSplits(some); });
     may_split_.take(list_);
     placeSplits();
 }
 
-/// Marks those that must split before v; if there are none, v may.
-void Adaption::forceAround(uint32_t v, const Star& star) {
-    const uint16_t level = mesh_.pulse[v].next_level;
-    uint32_t lowest = v;
-    mesh_.allNeighbours(v, star, [&](uint32_t w) {
-        const uint16_t other = mesh_.pulse[w].next_level;
-        DCHECK(other != level || level == kLeafLevel);
-        if (other < level && marked_.insert(w)) fresh_.insert(w);
-        if (other < mesh_.pulse[lowest].next_level) lowest = w;
-        return true;
-    });
-    if (lowest == v) {
-        may_split_.insert(v);
-    } else {
-        block(v, lowest, kSplit);
-        setBlockedInAllViews(v, false);
-    }
-}
-
-void Adaption::block(uint32_t v, uint32_t by, Blocked what) {
-    if (mesh_.pulse[v].blocker != VertexPulse::kNoBlocker && what == kSplit &&
-        mesh_.record[v].blocked == kMergeOfOther)
-        look_for_other_.insert(v);
-    mesh_.pulse[v].blocker = mesh_.pulse[by].name;
-    mesh_.record[v].blocked = what;
-}
-
-/// The operation that made u must not be undone until what hinders it changes.
-void Adaption::setBlockedInAllViews(uint32_t u, bool blocked) {
-    uint16_t& radius = mesh_.criteria[u].merge_radius;
-    radius = blocked ? radius | VertexCriteria::kBlocked
-                     : radius & uint16_t(~VertexCriteria::kBlocked);
-}
-
-/// The one of this name changes.
-void Adaption::wake(uint32_t v, uint32_t name) {
-    const std::atomic_ref blocker(mesh_.pulse[v].blocker);
-    if (blocker.load(std::memory_order_relaxed) != name) return;
-    blocker.store(VertexPulse::kNoBlocker, std::memory_order_relaxed);
-    switch (mesh_.record[v].blocked) {
-        case kSplit:
-            if (marked_.contains(v)) fresh_.insert(v);
-            break;
-        case kMerge:
-            setBlockedInAllViews(v, false);
-            if (!criterion_.needsLast(mesh_.vertex[v], mesh_.criteria[v])) may_merge_.insert(v);
-            break;
-        default: look_for_other_.insert(v);
-    }
-}
-
-void Adaption::findOthers() {
-    look_for_other_.take(list_);
-    for (const uint32_t v : list_) {
-        const uint16_t level = mesh_.pulse[v].last_level;
-        mesh_.allNeighbours(v, [&](uint32_t u) {
-            if (mesh_.pulse[u].last_level != level || level == 0) return true;
-            if (mesh_.record[u].blocked == kSplit) return false;
-            setBlockedInAllViews(u, false);
-            mesh_.pulse[u].blocker = VertexPulse::kNoBlocker;
-            if (!criterion_.needsLast(mesh_.vertex[u], mesh_.criteria[u])) may_merge_.insert(u);
-            return false;
-        });
-    }
-}
-
-void Adaption::findMerges() {
-    findOthers();
-    may_merge_.take(list_);
-    merge_.resize(list_.size());
-    forSome(list_, [&](std::span<const uint32_t> some, size_t first) {
-        findMerges(some, std::span(merge_).subspan(first, some.size()));
-    });
-    std::erase_if(merge_, [](const Merge& merge) { return merge.v == kNoCorner; });
-}
-
-void Adaption::findMerges(std::span<const uint32_t> candidates, std::span<Merge> merges) {
-    std::array<uint32_t, kTogether> ends;
-    std::array<size_t, kTogether> of;
+/// Marks those that must split before; where there are none, a vertex may.
+void Adaption::findSplits(Some fresh) {
+    std::array<uint32_t, kTogether> waiting;
     std::array<Star, kTogether> stars;
     size_t count = 0;
-    for (const uint32_t u : candidates)
-        __builtin_prefetch(&mesh_.source().operation[mesh_.record[u].last]);
-    for (size_t i = 0; i < candidates.size(); ++i) {
-        const uint32_t u = candidates[i];
-        merges[i] = {kNoCorner, u, {kNoCorner, kNoCorner}};
-        const Operation& o = mesh_.source().operation[mesh_.record[u].last];
-        const Vec3i centre = mesh_.vertex[u].position() - o.offset(o.isDummy() ? 0 : 1);
-        if (marked_.contains(u) || criterion_.needs(centre, o.error, o.radius)) continue;
-        if (o.isDummy()) merges[i].v = u;
-        of[count] = i;
-        ends[count++] = u;
-    }
-    for (int at_u = 1; at_u >= 0; --at_u) {
-        mesh_.gatherStars({ends.data(), count}, stars.data(),
-                          [&](uint32_t w) { __builtin_prefetch(&mesh_.pulse[w]); });
-        size_t kept = 0;
-        for (size_t j = 0; j < count; ++j) {
-            Merge& merge = merges[of[j]];
-            if (allowsMerge(ends[j], stars[j], merge.u, merge.v)) {
-                CHECK_NE(merge.v, kNoCorner);  // or it has split again, and a neighbour's is later
-                of[kept] = of[j];
-                ends[kept++] = merge.v;
-            } else {
-                merge.v = kNoCorner;
-            }
+    for (const uint32_t v : fresh) __builtin_prefetch(&mesh_.pulse[v]);
+    for (const uint32_t v : fresh) {
+        if (mesh_.pulse[v].lower() == 0) {
+            may_split_.insert(v);
+        } else {
+            waiting[count++] = v;
         }
-        count = kept;
     }
-}
-
-/// Whether the neighbours of an end of the operation that made u allow to undo it. Finds v.
-bool Adaption::allowsMerge(uint32_t end, const Star& star, uint32_t u, uint32_t& v) {
-    const uint16_t level = mesh_.pulse[u].last_level;
-    return mesh_.allNeighbours(end, star, [&](uint32_t w) {
-        if (w == u) return true;
-        const uint16_t other = mesh_.pulse[w].last_level;
-        if (other > level || marked_.contains(w)) {
-            block(u, end == u ? w : end, kMerge);
-            if (end != u) block(end, w, kMergeOfOther);
-            setBlockedInAllViews(u, other > level);
-            return false;
+    gather({waiting.data(), count}, stars.data());
+    for (size_t i = 0; i < count; ++i) {
+        const uint16_t level = mesh_.pulse[waiting[i]].next_level;
+        const auto force = [&](uint32_t w) {
+            if (mesh_.pulse[w].next_level < level) mark(w);
+            return true;
+        };
+        if (stars[i].count == 0) {
+            mesh_.allNeighbours(waiting[i], force);
+        } else {
+            for (const uint32_t w : stars[i].ring()) force(w);
         }
-        if (other == level) v = w;
-        return true;
-    });
+    }
 }
 
 /// Free places first, then the arrays' ends.
@@ -225,6 +128,92 @@ void Adaption::placeSplits() {
                      {place(free_face_, 2 * i, faces), place(free_face_, 2 * i + 1, faces)}};
 }
 
+/// Of those released: the u of their last operation.
+void Adaption::findCandidates() {
+    released_.take(list_);
+    forSome(list_, [&](Some some, size_t) {
+        std::array<Star, kTogether> stars;
+        gather(some, stars.data());
+        for (size_t i = 0; i < some.size(); ++i) {
+            uint32_t u = some[i];
+            if (!mesh_.canUndo(u)) {
+                const uint16_t level = mesh_.pulse[u].last_level;
+                for (const uint32_t w : stars[i].ring())
+                    if (mesh_.pulse[w].last_level == level) u = w;
+                if (!mesh_.canUndo(u)) continue;
+            }
+            uint16_t& radius = mesh_.criteria[u].merge_radius;
+            radius &= uint16_t(~VertexCriteria::kBlocked);
+            if (!criterion_.needsLast(mesh_.vertex[u], mesh_.criteria[u])) may_merge_.insert(u);
+        }
+    });
+}
+
+void Adaption::findMerges() {
+    findCandidates();
+    none_marked_ = marked_.empty();
+    may_merge_.take(list_);
+    merge_.resize(list_.size());
+    forSome(list_, [&](Some some, size_t first) {
+        findMerges(some, std::span(merge_).subspan(first, some.size()));
+    });
+    std::erase_if(merge_, [](const Merge& merge) { return merge.v == kNoCorner; });
+}
+
+/// Whether the operation that made u is.
+bool Adaption::isNeeded(uint32_t u) const {
+    const Operation& o = mesh_.source().operation[mesh_.record[u].last];
+    return criterion_.needs(mesh_.vertex[u].position() - o.offset(o.isDummy() ? 0 : 1), o.error,
+                            o.radius);
+}
+
+bool Adaption::anyMarked(const Star& star) const {
+    return std::any_of(star.ring().begin(), star.ring().end(),
+                       [&](uint32_t w) { return marked_.contains(w); });
+}
+
+void Adaption::findMerges(Some candidates, std::span<Merge> merges) {
+    std::array<uint32_t, kTogether> ends;
+    std::array<size_t, kTogether> of;
+    std::array<Star, kTogether> stars;
+    size_t count = 0;
+    const auto block = [&](uint32_t u) {
+        mesh_.criteria[u].merge_radius |= VertexCriteria::kBlocked;
+    };
+    for (const uint32_t u : candidates)
+        __builtin_prefetch(&mesh_.source().operation[mesh_.record[u].last]);
+    for (size_t i = 0; i < candidates.size(); ++i) {
+        const uint32_t u = candidates[i];
+        merges[i] = {kNoCorner, u, {kNoCorner, kNoCorner}};
+        if (mesh_.pulse[u].higher() > 0) {
+            block(u);
+        } else if (!marked_.contains(u) && !isNeeded(u)) {
+            of[count] = i;
+            ends[count++] = u;
+        }
+    }
+    gather({ends.data(), count}, stars.data());
+    size_t kept = 0;
+    for (size_t j = 0; j < count; ++j) {
+        if (!none_marked_ && anyMarked(stars[j])) continue;
+        const uint32_t u = ends[j];
+        uint32_t v = mesh_.record[u].last == kNoOperation ? kNoCorner : u;
+        for (const uint32_t w : stars[j].ring())
+            if (mesh_.pulse[w].last_level == mesh_.pulse[u].last_level) v = w;
+        if (mesh_.pulse[v].higher() > 0) {
+            block(u);
+        } else {
+            of[kept] = of[j];
+            ends[kept++] = v;
+            merges[of[j]].v = v;
+        }
+    }
+    if (none_marked_) return;
+    gather({ends.data(), kept}, stars.data());
+    for (size_t j = 0; j < kept; ++j)
+        if (anyMarked(stars[j])) merges[of[j]].v = kNoCorner;
+}
+
 /// What an operation between `id` and those after or before it reads, but for the star.
 void Adaption::prefetch(uint32_t v, OperationId id) const {
     __builtin_prefetch(&mesh_.source().operation[id]);
@@ -232,17 +221,17 @@ void Adaption::prefetch(uint32_t v, OperationId id) const {
     __builtin_prefetch(&mesh_.criteria[v], 1);
 }
 
-void Adaption::markIfNeeded(uint32_t v) {
-    if (criterion_.needsSplit(mesh_.vertex[v], mesh_.criteria[v])) {
-        marked_.insert(v);
-        fresh_.insert(v);
-    } else {
-        marked_.erase(v);
+/// `at`: neighbours of the one that has split, at its end v. Those that still wait for it mark it.
+void Adaption::wakeAround(const Star& star, uint32_t v, uint32_t at) {
+    bool force = false;
+    for (uint32_t i = 0; at != 0; ++i, at >>= 1) {
+        const uint32_t w = star.neighbour[i];
+        if (!(at & 1) || !marked_.contains(w)) continue;
+        const VertexPulse& p = mesh_.pulse[w];
+        if (p.lower() == 0) may_split_.insert(w);
+        force |= mesh_.pulse[v].next_level < p.next_level;
     }
-}
-
-void Adaption::wakeAround(uint32_t v, const Star& star, uint32_t name) {
-    mesh_.allNeighbours(v, star, [&](uint32_t w) { return wake(w, name), true; });
+    if (force || criterion_.needsSplit(mesh_.vertex[v], mesh_.criteria[v])) mark(v);
 }
 
 /// Sets places that are not used to kNoCorner.
@@ -254,58 +243,61 @@ void Adaption::applySplits(std::span<Split> splits) {
         vertices[i] = splits[i].v;
         prefetch(splits[i].v, mesh_.record[splits[i].v].next);
     }
-    mesh_.gatherStars({vertices.data(), splits.size()}, stars.data(),
-                      [&](uint32_t w) { __builtin_prefetch(&mesh_.pulse[w]); });
+    gather({vertices.data(), splits.size()}, stars.data());
     for (const Split& s : splits)
         for (const OperationId child : operation[mesh_.record[s.v].next].child)
             if (child != kNoOperation) __builtin_prefetch(&operation[child]);
     for (size_t i = 0; i < splits.size(); ++i) {
         Split& s = splits[i];
         const Operation& o = operation[mesh_.record[s.v].next];
-        wakeAround(s.v, stars[i], mesh_.pulse[s.v].name);
+        marked_.erase(s.v);
         if (o.isDummy()) {
-            mesh_.move(s.v);
+            mesh_.move(s.v, stars[i]);
             s = {s.v, kNoCorner, {kNoCorner, kNoCorner}};
+            wakeAround(stars[i], s.v, (1u << stars[i].neighbours()) - 1);
         } else {
             CHECK(mesh_.orient(stars[i]));
-            mesh_.split(s.v, stars[i], s.u, s.face);
-            markIfNeeded(s.u);
+            const auto [at_v, at_u] = mesh_.split(s.v, stars[i], s.u, s.face);
             if (o.rankLeft() == kNoRank || o.rankRight() == kNoRank) s.face[1] = kNoCorner;
+            wakeAround(stars[i], s.v, at_v);
+            wakeAround(stars[i], s.u, at_u);
         }
-        markIfNeeded(s.v);
     }
 }
 
 void Adaption::applyMerges(std::span<Merge> merges) {
-    std::array<uint32_t, kTogether> vertices;
-    std::array<Star, kTogether> stars;
-    for (size_t i = 0; i < merges.size(); ++i) {
-        vertices[i] = merges[i].u;
+    std::array<uint32_t, 2 * kTogether> vertices;
+    std::array<Star, 2 * kTogether> stars;
+    const size_t count = merges.size();
+    for (size_t i = 0; i < count; ++i) {
+        vertices[i] = merges[i].v;
+        vertices[count + i] = merges[i].u;
         prefetch(merges[i].v, mesh_.record[merges[i].u].last);
         __builtin_prefetch(&mesh_.record[merges[i].v]);
     }
-    mesh_.gatherStars({vertices.data(), merges.size()}, stars.data(), [&](uint32_t) {});
+    gather({vertices.data(), count}, stars.data());
+    gather({vertices.data() + count, count}, stars.data() + count);
     for (const Merge& m : merges) {
         const OperationId before = mesh_.record[m.u].undo_last;
         if (before != kNoOperation) __builtin_prefetch(&mesh_.source().operation[before]);
     }
-    for (Merge& m : merges) applyMerge(m);
-}
-
-void Adaption::applyMerge(Merge& m) {
-    const uint32_t name = mesh_.pulse[m.v].name, other = mesh_.pulse[m.u].name;
-    if (m.u == m.v) {
-        mesh_.moveBack(m.v);
-        m.u = kNoCorner;
-    } else {
-        m.face = mesh_.merge(m.v, m.u);
+    for (size_t i = 0; i < count; ++i) {
+        Merge& m = merges[i];
+        if (m.u == m.v) {
+            mesh_.moveBack(m.v, stars[i]);
+            m.u = kNoCorner;
+        } else {
+            m.face = mesh_.merge(m.v, stars[i], m.u, stars[count + i]);
+        }
+        const auto release = [&](uint32_t w) {
+            const VertexPulse& p = mesh_.pulse[w];
+            if (p.last_level != 0 && p.higher() == 0) released_.insert(w);
+        };
+        for (const size_t end : {i, count + i})
+            for (const uint32_t w : stars[end].ring())
+                if (w != m.u && w != m.v) release(w);
+        release(m.v);
     }
-    mesh_.allNeighbours(m.v, [&](uint32_t w) {
-        wake(w, name);
-        wake(w, other);
-        return true;
-    });
-    if (!criterion_.needsLast(mesh_.vertex[m.v], mesh_.criteria[m.v])) may_merge_.insert(m.v);
 }
 
 void Adaption::apply() {
@@ -315,7 +307,7 @@ void Adaption::apply() {
     };
     mesh_.resize(mesh_.vertexCount() + beyond(splits, free_vertex_),
                  mesh_.faceCount() + beyond(2 * splits, free_face_));
-    for (VertexSet* set : {&marked_, &fresh_, &may_split_, &may_merge_, &look_for_other_})
+    for (VertexSet* set : {&marked_, &fresh_, &may_split_, &released_, &may_merge_})
         set->resize(mesh_.vertexCount());
     const std::vector<Split> places = split_;
     forSome(split_, [&](std::span<Split> some, size_t) { applySplits(some); });
@@ -339,7 +331,7 @@ void Adaption::apply() {
 
 /// No place is left free.
 void Adaption::tidy() {
-    findOthers();
+    findCandidates();
     if (!free_vertex_.empty() || !free_face_.empty()) mesh_.fillHoles(free_vertex_, free_face_);
     free_vertex_.clear();
     free_face_.clear();

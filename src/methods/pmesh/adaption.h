@@ -10,10 +10,8 @@
 //      other neighbour's last one has its level or a higher one. Where both meet, splits win: no
 //      vertex around may be marked.
 //   3. All splits and merges are done, new elements in free places, in the order of the vertices.
-// What must wait remembers *one* neighbour that hinders it, by name, and is looked at again when that
-// one splits or merges, in the next pass; for as long as neither changes it still must wait, as an
-// edge between two unchanged vertices does not go away. So passes go on from what the last one
-// changed, and what hinders a merge is remembered from frame to frame.
+// Each vertex counts the neighbours that it must wait for (VertexPulse::around); when none is left,
+// it is looked at in the next pass. So passes go on from what the last one changed.
 // At a frame's end the last elements move into the places that merges left; after as many operations
 // as there are vertices, all are sorted in space.
 //
@@ -62,38 +60,34 @@ private:
         uint32_t v, u;
         std::array<uint32_t, 2> face;
     };
+    using Some = std::span<const uint32_t>;
 
-    /// What a blocker hinders: a split, the undoing of the operation that made this u, or, known at
-    /// its v, of the operation that is the last of v.
-    enum Blocked : uint8_t { kSplit, kMerge, kMergeOfOther };
-
+    bool isNeeded(uint32_t u) const;
     void scan();
     void findSplits();
-    void forceAround(uint32_t v, const Star& star);
-    void findMerges();
-    void findMerges(std::span<const uint32_t> candidates, std::span<Merge> merges);
-    bool allowsMerge(uint32_t end, const Star& star, uint32_t u, uint32_t& v);
-    void findOthers();
-    void block(uint32_t v, uint32_t by, Blocked what);
-    void setBlockedInAllViews(uint32_t u, bool blocked);
-    void wakeAround(uint32_t v, const Star& star, uint32_t name);
-    void wake(uint32_t v, uint32_t name);
-    void markIfNeeded(uint32_t v);
+    void findSplits(Some fresh);
     void placeSplits();
+    void mark(uint32_t v);
+    void findCandidates();
+    void findMerges();
+    void findMerges(Some candidates, std::span<Merge> merges);
+    bool anyMarked(const Star& star) const;
     void prefetch(uint32_t v, OperationId id) const;
+    void gather(Some vertices, Star* stars) const;
     void applySplits(std::span<Split> splits);
+    void wakeAround(const Star& star, uint32_t v, uint32_t at);
     void applyMerges(std::span<Merge> merges);
-    void applyMerge(Merge& merge);
     void apply();
     void tidy();
 
     ActiveMesh mesh_;
     Criterion criterion_;
-    VertexSet marked_;      ///< needed, or needed by a neighbour
-    VertexSet fresh_;       ///< marked, not looked at yet, or not since what hindered it changed
+    VertexSet marked_;     ///< needed, or needed by a neighbour
+    VertexSet fresh_;      ///< marked, not looked at yet
     VertexSet may_split_;
-    VertexSet may_merge_;   ///< the last operation is not needed: to be looked at
-    VertexSet look_for_other_;  ///< their u is to be looked at
+    VertexSet released_;   ///< no neighbour's last level is higher any more
+    VertexSet may_merge_;  ///< the last operation, which made them, is not needed
+    bool none_marked_ = false;
     std::vector<uint32_t> list_;
     std::vector<Split> split_;
     std::vector<Merge> merge_;

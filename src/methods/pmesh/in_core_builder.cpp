@@ -167,7 +167,9 @@ void Encoder::encodeDummy(ActiveMesh& active, OperationId id, const CollapseReco
     }
     o.radius = uint16_t(encodeRoundedUp<11>(lengthOf(offset)));
     o.error = errorCode(lengthOf(offset));
-    active.move(v);
+    Star star;
+    active.gatherStars({&v, 1}, &star, [](uint32_t) {});
+    active.move(v, star);
 }
 
 void Encoder::encode(ActiveMesh& active, OperationId id, const CollapseRecord& r) {
@@ -179,7 +181,7 @@ void Encoder::encode(ActiveMesh& active, OperationId id, const CollapseRecord& r
     uint32_t left = kNoRank, right = kNoRank, radius = 0;
     const Vec3i from = active.vertex[v].position();
     for (uint32_t rank = 0; rank < star.neighbours(); ++rank) {
-        const uint32_t w = active.neighbour(star, rank);
+        const uint32_t w = star.neighbour[rank];
         if (r.left != kNoVertex && w == slot_of_[r.left]) left = rank;
         if (r.right != kNoVertex && w == slot_of_[r.right]) right = rank;
         radius = std::max(radius, lengthOf(active.vertex[w].position() - from));

@@ -39,6 +39,16 @@ public:
         word_[w] |= bits;
         use(w);
     }
+    /// Not while others insert.
+    bool empty() {
+        for (size_t i = 0; i < used_.size(); ++i)
+            for (uint64_t used = used_[i]; used != 0; used &= used - 1) {
+                const int bit = std::countr_zero(used);
+                if (word_[64 * i + size_t(bit)] != 0) return false;
+                used_[i] &= ~(uint64_t(1) << bit);
+            }
+        return true;
+    }
     /// Moves all to `list`, sorted.
     void take(std::vector<uint32_t>& list) {
         list.clear();
