@@ -309,17 +309,22 @@ std::array<uint32_t, 2> ActiveMesh::merge(uint32_t v, const Star& star, uint32_t
     setNext(v, id);
 
     uint32_t around = 0;
-    for (const uint32_t w : star.ring()) {
+    for (uint32_t i = 0; i < star.neighbours(); ++i) {
+        const uint32_t w = star.neighbour[i];
         if (w == u) continue;
         addAround(w, a.weightOn(pulse[w]) - before.weightOn(pulse[w]));
         around += pulse[w].weightOn(a);
+        if (!open && pulse[w].last_level == a.last_level)
+            a.corner = star.corner[w != vr ? i : (i + star.count - 1) % star.count];
     }
     for (uint32_t i = 0; i < ring; ++i) {
         const uint32_t w = other.neighbour[i];
         if (w == v) continue;
         const bool new_at_v = w != vl && w != vr;
         addAround(w, (new_at_v ? a.weightOn(pulse[w]) : 0) - b.weightOn(pulse[w]));
-        if (new_at_v) around += pulse[w].weightOn(a);
+        if (!new_at_v) continue;
+        around += pulse[w].weightOn(a);
+        if (!open && pulse[w].last_level == a.last_level) a.corner = other.corner[i];
     }
     a.around = around;
     b.name = kNoCorner;

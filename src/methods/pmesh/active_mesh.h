@@ -36,7 +36,9 @@ struct alignas(32) ActiveFace {
 /// What a vertex's neighbours look at.
 struct alignas(16) VertexPulse {
     uint32_t name;
-    uint32_t corner;      ///< one of its corners; where the fan is open, the first
+    /// One of its corners; where the fan is open, the first. Else, after a split and until the next,
+    /// in a triangle with the other end.
+    uint32_t corner;
     uint16_t next_level;  ///< of the next split, or kLeafLevel
     uint16_t last_level;  ///< 1 + that of the last, or 0; equal only for v and u of one split
     /// How many neighbours' next levels are lower: these must split before; and, in the upper half,
@@ -127,6 +129,20 @@ public:
         const OperationId last = record[u].last;
         return last != kNoOperation &&
                (pulse[u].name == source_->nameOf(last) || source_->operation[last].isDummy());
+    }
+
+    /// The other end of the last split of v, or v itself if that one has gone on or there is none.
+    uint32_t otherEnd(uint32_t v) const {
+        const VertexPulse& p = pulse[v];
+        if (p.last_level == 0) return v;
+        for (const uint32_t w : {vertexAt(nextCorner(p.corner)), vertexAt(previousCorner(p.corner))})
+            if (pulse[w].last_level == p.last_level) return w;
+        uint32_t other = v;
+        allNeighbours(v, [&](uint32_t w) {
+            if (pulse[w].last_level == p.last_level) other = w;
+            return other == v;
+        });
+        return other;
     }
 
     /// Performs the next operation of v alone, and makes room for it. False, and nothing done, if

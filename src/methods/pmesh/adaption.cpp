@@ -132,21 +132,23 @@ void Adaption::placeSplits() {
 void Adaption::findCandidates() {
     released_.take(list_);
     forSome(list_, [&](Some some, size_t) {
-        std::array<Star, kTogether> stars;
-        gather(some, stars.data());
-        for (size_t i = 0; i < some.size(); ++i) {
-            uint32_t u = some[i];
-            if (!mesh_.canUndo(u)) {
-                const uint16_t level = mesh_.pulse[u].last_level;
-                for (const uint32_t w : stars[i].ring())
-                    if (mesh_.pulse[w].last_level == level) u = w;
-                if (!mesh_.canUndo(u)) continue;
-            }
+        prefetchOtherEnds(some);
+        for (uint32_t u : some) {
+            if (!mesh_.canUndo(u)) u = mesh_.otherEnd(u);
+            if (!mesh_.canUndo(u)) continue;
             uint16_t& radius = mesh_.criteria[u].merge_radius;
             radius &= uint16_t(~VertexCriteria::kBlocked);
             if (!criterion_.needsLast(mesh_.vertex[u], mesh_.criteria[u])) may_merge_.insert(u);
         }
     });
+}
+
+void Adaption::prefetchOtherEnds(Some vertices) const {
+    for (const uint32_t v : vertices) __builtin_prefetch(&mesh_.pulse[v]);
+    for (const uint32_t v : vertices) __builtin_prefetch(&mesh_.face[mesh_.pulse[v].corner >> 2]);
+    for (const uint32_t v : vertices)
+        for (const uint32_t w : mesh_.face[mesh_.pulse[v].corner >> 2].vertex)
+            __builtin_prefetch(&mesh_.pulse[w]);
 }
 
 void Adaption::findMerges() {
@@ -167,15 +169,13 @@ bool Adaption::isNeeded(uint32_t u) const {
                             o.radius);
 }
 
-bool Adaption::anyMarked(const Star& star) const {
-    return std::any_of(star.ring().begin(), star.ring().end(),
-                       [&](uint32_t w) { return marked_.contains(w); });
+bool Adaption::anyMarkedAround(uint32_t v) const {
+    return !mesh_.allNeighbours(v, [&](uint32_t w) { return !marked_.contains(w); });
 }
 
 void Adaption::findMerges(Some candidates, std::span<Merge> merges) {
     std::array<uint32_t, kTogether> ends;
     std::array<size_t, kTogether> of;
-    std::array<Star, kTogether> stars;
     size_t count = 0;
     const auto block = [&](uint32_t u) {
         mesh_.criteria[u].merge_radius |= VertexCriteria::kBlocked;
@@ -192,26 +192,18 @@ void Adaption::findMerges(Some candidates, std::span<Merge> merges) {
             ends[count++] = u;
         }
     }
-    gather({ends.data(), count}, stars.data());
-    size_t kept = 0;
+    prefetchOtherEnds({ends.data(), count});
     for (size_t j = 0; j < count; ++j) {
-        if (!none_marked_ && anyMarked(stars[j])) continue;
-        const uint32_t u = ends[j];
-        uint32_t v = mesh_.record[u].last == kNoOperation ? kNoCorner : u;
-        for (const uint32_t w : stars[j].ring())
-            if (mesh_.pulse[w].last_level == mesh_.pulse[u].last_level) v = w;
+        const uint32_t u = ends[j], v = mesh_.otherEnd(u);
         if (mesh_.pulse[v].higher() > 0) {
             block(u);
         } else {
-            of[kept] = of[j];
-            ends[kept++] = v;
             merges[of[j]].v = v;
         }
     }
     if (none_marked_) return;
-    gather({ends.data(), kept}, stars.data());
-    for (size_t j = 0; j < kept; ++j)
-        if (anyMarked(stars[j])) merges[of[j]].v = kNoCorner;
+    for (Merge& m : merges)
+        if (m.v != kNoCorner && (anyMarkedAround(m.u) || anyMarkedAround(m.v))) m.v = kNoCorner;
 }
 
 /// What an operation between `id` and those after or before it reads, but for the star.

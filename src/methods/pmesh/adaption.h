@@ -71,7 +71,8 @@ private:
     void findCandidates();
     void findMerges();
     void findMerges(Some candidates, std::span<Merge> merges);
-    bool anyMarked(const Star& star) const;
+    void prefetchOtherEnds(Some vertices) const;
+    bool anyMarkedAround(uint32_t v) const;
     void prefetch(uint32_t v, OperationId id) const;
     void gather(Some vertices, Star* stars) const;
     void applySplits(std::span<Split> splits);
