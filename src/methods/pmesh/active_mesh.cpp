@@ -1,14 +1,15 @@
 #include "methods/pmesh/active_mesh.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_sort.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numeric>
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "geometry/bounds.h"
 
 namespace pietra::pmesh {
 namespace {
@@ -25,28 +26,27 @@ uint16_t radiusAroundU(const Operation& o) {
     return uint16_t(decodeRadius(code) > rest ? code - 1 : code);
 }
 
-/// Every third bit of the result.
-uint64_t spread(uint32_t x) {
-    uint64_t bits = x & 0x1fffff;
-    bits = (bits | bits << 32) & 0x001f00000000ffff;
-    bits = (bits | bits << 16) & 0x001f0000ff0000ff;
-    bits = (bits | bits << 8) & 0x100f00f00f00f00f;
-    bits = (bits | bits << 4) & 0x10c30c30c30c30c3;
-    return (bits | bits << 2) & 0x1249249249249249;
+/// Six bits of x, every third bit of the result.
+uint32_t spread(uint32_t x) {
+    uint32_t bits = x & 0x3f;
+    bits = (bits | bits << 8) & 0x0300f;
+    bits = (bits | bits << 4) & 0x030c3;
+    return (bits | bits << 2) & 0x09249;
 }
 
-/// Where each of `count` elements goes: those from `first` on by their keys, the others stay.
+/// Where each of `count` elements goes: those from `first` on by their keys, each below `keys`; the
+/// others stay.
 template <class KeyOf>
-std::vector<uint32_t> placesByKey(size_t first, size_t count, KeyOf&& key_of) {
-    std::vector<std::pair<uint64_t, uint32_t>> order(count - first);
-    parallelForSlices(order.size(), 16 * kGrain, [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i)
-            order[i] = {key_of(uint32_t(first + i)), uint32_t(first + i)};
+std::vector<uint32_t> placesByKey(size_t first, size_t count, size_t keys, KeyOf&& key_of) {
+    std::vector<uint32_t> place(count), begin(keys + 1, 0);
+    parallelForSlices(count - first, 16 * kGrain, [&](size_t from, size_t to) {
+        for (size_t i = first + from; i < first + to; ++i) place[i] = key_of(uint32_t(i));
     });
-    tbb::parallel_sort(order.begin(), order.end());
-    std::vector<uint32_t> place(count);
+    for (size_t i = first; i < count; ++i) ++begin[place[i] + 1];
+    begin[0] = uint32_t(first);
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    for (size_t i = first; i < count; ++i) place[i] = begin[place[i]]++;
     std::iota(place.begin(), place.begin() + ptrdiff_t(first), 0u);
-    for (size_t i = 0; i < order.size(); ++i) place[order[i].second] = uint32_t(first + i);
     return place;
 }
 
@@ -118,16 +118,12 @@ void ActiveMesh::setLast(uint32_t v, OperationId last) {
 bool ActiveMesh::orient(Star& star) const {
     if (star.count == 0 || star.neighbours() > kMaxNeighbours) return false;
     if (!star.closed) return true;
-    uint32_t least = 0, least_name = ~0u;
+    uint32_t least_name = ~0u;
     for (uint32_t i = 0; i < star.count; ++i) {
         const uint32_t name = pulse[star.neighbour[i]].name;
-        if (name < least_name) least = i, least_name = name;
+        star.first = name < least_name ? i : star.first;
+        least_name = std::min(name, least_name);
     }
-    const auto rotate = [&](auto& ring) {
-        std::rotate(ring.begin(), ring.begin() + least, ring.begin() + star.count);
-    };
-    rotate(star.corner);
-    rotate(star.neighbour);
     return true;
 }
 
@@ -197,8 +193,8 @@ std::array<uint32_t, 2> ActiveMesh::split(uint32_t v, const Star& star, uint32_t
                                           std::array<uint32_t, 2> faces) {
     const OperationId id = record[v].next;
     const Operation& o = source_->operation[id];
-    const uint32_t n = star.count, l = o.rankLeft(), r = o.rankRight();
-    const bool has_left = l != kNoRank, has_right = r != kNoRank;
+    const bool has_left = o.rankLeft() != kNoRank, has_right = o.rankRight() != kNoRank;
+    const uint32_t n = star.count, l = star.placeOf(o.rankLeft()), r = star.placeOf(o.rankRight());
     // A triangle of the star by its place; beyond an open fan's ends there is none.
     const auto triangle = [&](uint32_t i) {
         if (i < n) return star.corner[i];
@@ -258,18 +254,46 @@ std::array<uint32_t, 2> ActiveMesh::split(uint32_t v, const Star& star, uint32_t
     };
     const uint32_t of_v = arc(has_left ? l : 0, has_right ? r : ring - 1);
     const uint32_t of_u = arc(has_right ? r : 0, has_left ? l : ring - 1);
-    uint32_t around_v = b.weightOn(a), around_u = a.weightOn(b);
-    for (uint32_t i = 0; i < ring; ++i) {
-        const VertexPulse& p = pulse[star.neighbour[i]];
-        const uint32_t at_v = 0 - (of_v >> i & 1), at_u = 0 - (of_u >> i & 1);
-        around_v += p.weightOn(a) & at_v;
-        around_u += p.weightOn(b) & at_u;
-        addAround(star.neighbour[i],
-                  (a.weightOn(p) & at_v) + (b.weightOn(p) & at_u) - before.weightOn(p));
-    }
-    a.around = around_v;
-    b.around = around_u;
+    changeAround(star, before, a, of_v, b, of_u);
     return {of_v, of_u};
+}
+
+/// The one that was `before` has become a and b, whose neighbours are told by bits.
+void ActiveMesh::changeAround(const Star& star, const VertexPulse& before, VertexPulse& a,
+                              uint32_t of_a, VertexPulse& b, uint32_t of_b) {
+    // In loops that become vector instructions.
+    constexpr uint32_t kRing = kMaxNeighbours + 1;
+    std::array<int16_t, kRing> next{}, last{}, at_a, at_b, lower, higher;
+    for (uint32_t i = 0; i < star.neighbours(); ++i) {
+        next[i] = int16_t(pulse[star.neighbour[i]].next_level);
+        last[i] = int16_t(pulse[star.neighbour[i]].last_level);
+    }
+    for (uint32_t i = 0; i < kRing; ++i) {
+        at_a[i] = uint16_t(of_a) & uint16_t(1u << i) ? 1 : 0;
+        at_b[i] = uint16_t(of_b) & uint16_t(1u << i) ? 1 : 0;
+    }
+    const auto count = [&](auto& change, const auto& level, auto&& weighs, int16_t level_a,
+                           int16_t level_b, int16_t level_before) {
+        int16_t around_a = weighs(level_b, level_a), around_b = weighs(level_a, level_b);
+        for (uint32_t i = 0; i < kRing; ++i) {
+            change[i] = int16_t((weighs(level_a, level[i]) & at_a[i]) +
+                                (weighs(level_b, level[i]) & at_b[i]) -
+                                weighs(level_before, level[i]));
+            around_a = int16_t(around_a + (weighs(level[i], level_a) & at_a[i]));
+            around_b = int16_t(around_b + (weighs(level[i], level_b) & at_b[i]));
+        }
+        return std::pair(uint32_t(around_a), uint32_t(around_b));
+    };
+    const auto [lower_a, lower_b] =
+        count(lower, next, [](int16_t x, int16_t y) { return int16_t(x < y); },
+              int16_t(a.next_level), int16_t(b.next_level), int16_t(before.next_level));
+    const auto [higher_a, higher_b] =
+        count(higher, last, [](int16_t x, int16_t y) { return int16_t(x > y); },
+              int16_t(a.last_level), int16_t(b.last_level), int16_t(before.last_level));
+    for (uint32_t i = 0; i < star.neighbours(); ++i)
+        addAround(star.neighbour[i], uint32_t(lower[i]) + (uint32_t(higher[i]) << 16));
+    a.around = lower_a + (higher_a << 16);
+    b.around = lower_b + (higher_b << 16);
 }
 
 std::array<uint32_t, 2> ActiveMesh::merge(uint32_t v, const Star& star, uint32_t u,
@@ -400,13 +424,18 @@ void ActiveMesh::moveFaces(const std::vector<uint32_t>& from, const std::vector<
 }
 
 void ActiveMesh::sortInSpace() {
+    Box3i box;
+    for (const Vertex& v : vertex) box.add(v.position());
+    const Vec3i size = box.max - box.min;
+    const int shift =
+        std::max(int(std::bit_width(uint32_t(std::max({size.x, size.y, size.z})))) - 6, 0);
     const std::vector<uint32_t> place =
-        placesByKey(source_->base_vertex.size(), vertexCount(), [&](uint32_t v) {
-            const Vertex& p = vertex[v];
+        placesByKey(source_->base_vertex.size(), vertexCount(), 1 << 18, [&](uint32_t v) {
+            const Vec3i p = (vertex[v].position() - box.min) >> shift;
             return spread(uint32_t(p.x)) | spread(uint32_t(p.y)) << 1 | spread(uint32_t(p.z)) << 2;
         });
     const std::vector<uint32_t> face_place =
-        placesByKey(source_->base_triangle.size(), faceCount(), [&](uint32_t f) {
+        placesByKey(source_->base_triangle.size(), faceCount(), vertexCount(), [&](uint32_t f) {
             const auto& v = face[f].vertex;
             return std::min({place[v[0]], place[v[1]], place[v[2]]});
         });

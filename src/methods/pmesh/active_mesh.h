@@ -15,6 +15,7 @@
 
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -83,9 +84,14 @@ struct Star {
     static constexpr uint32_t kRoom = 24;
     uint32_t count = 0;  ///< of corners; 0: more than there is room for
     bool closed = false;
+    uint32_t first = 0;  ///< ranks count from here
     std::array<uint32_t, kRoom> corner;  ///< at the vertex
     std::array<uint32_t, kRoom + 1> neighbour;
     uint32_t neighbours() const { return closed ? count : count + 1; }
+    uint32_t placeOf(uint32_t rank) const {
+        const uint32_t place = first + rank;
+        return place < neighbours() ? place : place - neighbours();
+    }
     std::span<const uint32_t> ring() const { return {neighbour.data(), neighbours()}; }
 };
 
@@ -121,8 +127,8 @@ public:
     template <class Prefetch>
     void gatherStars(std::span<const uint32_t> vertices, Star* stars, Prefetch&& prefetch) const;
 
-    /// Turns the star of a vertex that is to split so that ranks count from its beginning: where it
-    /// is closed, at the neighbour of the least name. False if it has too many neighbours.
+    /// Finds from where ranks count in the star of a vertex that is to split: where it is closed,
+    /// from the neighbour of the least name. False if it has too many neighbours.
     [[nodiscard]] bool orient(Star& star) const;
     /// The operation that `u` came from last made it, or is a dummy: it is undone from here.
     bool canUndo(uint32_t u) const {
@@ -186,6 +192,8 @@ private:
         std::atomic_ref(pulse[v].around).fetch_add(weight, std::memory_order_relaxed);
     }
     void changeAround(uint32_t v, const Star& star, const VertexPulse& before);
+    void changeAround(const Star& star, const VertexPulse& before, VertexPulse& a, uint32_t of_a,
+                      VertexPulse& b, uint32_t of_b);
     void setNext(uint32_t v, OperationId next);
     void setLast(uint32_t v, OperationId last);
     void link(uint32_t half_edge, uint32_t other);
@@ -217,41 +225,37 @@ bool ActiveMesh::allNeighbours(uint32_t v, Body&& body) const {
 template <class Prefetch>
 void ActiveMesh::gatherStars(std::span<const uint32_t> vertices, Star* stars,
                              Prefetch&& prefetch) const {
-    std::array<uint32_t, kTogether> corner, walking;
-    uint32_t count = uint32_t(vertices.size());
-    for (uint32_t i = 0; i < count; ++i) {
+    std::array<uint32_t, kTogether> corner;
+    uint32_t walking = (1u << vertices.size()) - 1;
+    for (size_t i = 0; i < vertices.size(); ++i) {
         corner[i] = pulse[vertices[i]].corner;
         __builtin_prefetch(&face[corner[i] >> 2]);
-        stars[i].count = 0;
-        walking[i] = i;
+        stars[i].count = stars[i].first = 0;
+        stars[i].closed = false;
     }
-    while (count > 0) {
-        uint32_t still = 0;
-        for (uint32_t j = 0; j < count; ++j) {
-            const uint32_t i = walking[j], c = corner[i];
+    while (walking != 0)
+        for (uint32_t rest = walking; rest != 0; rest &= rest - 1) {
+            const uint32_t i = uint32_t(std::countr_zero(rest)), c = corner[i];
             const ActiveFace& f = face[c >> 2];
             Star& star = stars[i];
-            const uint32_t w = f.vertex[(c & 3) + 1];
-            star.corner[star.count] = c;
-            star.neighbour[star.count++] = w;
+            const uint32_t w = f.vertex[(c & 3) + 1], left = f.left[c & 3], at = star.count++;
+            star.corner[at] = c;
+            star.neighbour[at] = w;
             prefetch(w);
-            corner[i] = f.left[c & 3];
-            star.closed = corner[i] == star.corner[0];
-            if (star.closed) continue;
-            if (corner[i] == kNoCorner) {
-                star.neighbour[star.count] = vertexAt(previousCorner(c));
-                prefetch(star.neighbour[star.count]);
-                continue;
-            }
-            if (star.count == Star::kRoom) {
+            if (left == kNoCorner) {
+                star.neighbour[at + 1] = vertexAt(previousCorner(c));
+                prefetch(star.neighbour[at + 1]);
+            } else if (left == star.corner[0]) {
+                star.closed = true;
+            } else if (at + 1 == Star::kRoom) {
                 star.count = 0;
+            } else {
+                corner[i] = left;
+                __builtin_prefetch(&face[left >> 2]);
                 continue;
             }
-            __builtin_prefetch(&face[corner[i] >> 2]);
-            walking[still++] = i;
+            walking &= ~(1u << i);
         }
-        count = still;
-    }
 }
 
 }  // namespace pietra::pmesh

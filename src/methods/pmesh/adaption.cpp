@@ -1,7 +1,7 @@
 #include "methods/pmesh/adaption.h"
 
 #include <algorithm>
-#include <atomic>
+#include <bit>
 
 #include "base/check.h"
 #include "base/parallel.h"
@@ -213,12 +213,12 @@ void Adaption::prefetch(uint32_t v, OperationId id) const {
     __builtin_prefetch(&mesh_.criteria[v], 1);
 }
 
-/// `at`: neighbours of the one that has split, at its end v. Those that still wait for it mark it.
+/// `at`: marked neighbours of the one that has split, at its end v. Those that still wait for it
+/// mark it.
 void Adaption::wakeAround(const Star& star, uint32_t v, uint32_t at) {
     bool force = false;
-    for (uint32_t i = 0; at != 0; ++i, at >>= 1) {
-        const uint32_t w = star.neighbour[i];
-        if (!(at & 1) || !marked_.contains(w)) continue;
+    for (; at != 0; at &= at - 1) {
+        const uint32_t w = star.neighbour[size_t(std::countr_zero(at))];
         const VertexPulse& p = mesh_.pulse[w];
         if (p.lower() == 0) may_split_.insert(w);
         force |= mesh_.pulse[v].next_level < p.next_level;
@@ -243,16 +243,19 @@ void Adaption::applySplits(std::span<Split> splits) {
         Split& s = splits[i];
         const Operation& o = operation[mesh_.record[s.v].next];
         marked_.erase(s.v);
+        uint32_t marked = 0;
+        for (uint32_t j = 0; j < stars[i].neighbours(); ++j)
+            marked |= uint32_t(marked_.contains(stars[i].neighbour[j])) << j;
         if (o.isDummy()) {
             mesh_.move(s.v, stars[i]);
             s = {s.v, kNoCorner, {kNoCorner, kNoCorner}};
-            wakeAround(stars[i], s.v, (1u << stars[i].neighbours()) - 1);
+            wakeAround(stars[i], s.v, marked);
         } else {
             CHECK(mesh_.orient(stars[i]));
             const auto [at_v, at_u] = mesh_.split(s.v, stars[i], s.u, s.face);
             if (o.rankLeft() == kNoRank || o.rankRight() == kNoRank) s.face[1] = kNoCorner;
-            wakeAround(stars[i], s.v, at_v);
-            wakeAround(stars[i], s.u, at_u);
+            wakeAround(stars[i], s.v, at_v & marked);
+            wakeAround(stars[i], s.u, at_u & marked);
         }
     }
 }

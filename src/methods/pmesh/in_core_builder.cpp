@@ -181,7 +181,7 @@ void Encoder::encode(ActiveMesh& active, OperationId id, const CollapseRecord& r
     uint32_t left = kNoRank, right = kNoRank, radius = 0;
     const Vec3i from = active.vertex[v].position();
     for (uint32_t rank = 0; rank < star.neighbours(); ++rank) {
-        const uint32_t w = star.neighbour[rank];
+        const uint32_t w = star.neighbour[star.placeOf(rank)];
         if (r.left != kNoVertex && w == slot_of_[r.left]) left = rank;
         if (r.right != kNoVertex && w == slot_of_[r.right]) right = rank;
         radius = std::max(radius, lengthOf(active.vertex[w].position() - from));
