@@ -130,11 +130,14 @@ public:
     /// Finds from where ranks count in the star of a vertex that is to split: where it is closed,
     /// from the neighbour of the least name. False if it has too many neighbours.
     [[nodiscard]] bool orient(Star& star) const;
+    /// The last split of `u` made it.
+    bool isNewEnd(uint32_t u) const {
+        return pulse[u].last_level != 0 && pulse[u].name == source_->nameOf(record[u].last);
+    }
     /// The operation that `u` came from last made it, or is a dummy: it is undone from here.
     bool canUndo(uint32_t u) const {
         const OperationId last = record[u].last;
-        return last != kNoOperation &&
-               (pulse[u].name == source_->nameOf(last) || source_->operation[last].isDummy());
+        return last != kNoOperation && (isNewEnd(u) || source_->operation[last].isDummy());
     }
 
     /// The other end of the last split of v, or v itself if that one has gone on or there is none.

@@ -134,7 +134,7 @@ void Adaption::findCandidates() {
     forSome(list_, [&](Some some, size_t) {
         prefetchOtherEnds(some);
         for (uint32_t u : some) {
-            if (!mesh_.canUndo(u)) u = mesh_.otherEnd(u);
+            if (!mesh_.isNewEnd(u)) u = mesh_.otherEnd(u);
             if (!mesh_.canUndo(u)) continue;
             uint16_t& radius = mesh_.criteria[u].merge_radius;
             radius &= uint16_t(~VertexCriteria::kBlocked);
@@ -144,7 +144,12 @@ void Adaption::findCandidates() {
 }
 
 void Adaption::prefetchOtherEnds(Some vertices) const {
-    for (const uint32_t v : vertices) __builtin_prefetch(&mesh_.pulse[v]);
+    for (const uint32_t v : vertices) {
+        __builtin_prefetch(&mesh_.pulse[v]);
+        __builtin_prefetch(&mesh_.record[v]);
+        __builtin_prefetch(&mesh_.criteria[v], 1);
+        __builtin_prefetch(&mesh_.vertex[v]);
+    }
     for (const uint32_t v : vertices) __builtin_prefetch(&mesh_.face[mesh_.pulse[v].corner >> 2]);
     for (const uint32_t v : vertices)
         for (const uint32_t w : mesh_.face[mesh_.pulse[v].corner >> 2].vertex)
@@ -180,6 +185,11 @@ void Adaption::findMerges(Some candidates, std::span<Merge> merges) {
     const auto block = [&](uint32_t u) {
         mesh_.criteria[u].merge_radius |= VertexCriteria::kBlocked;
     };
+    for (const uint32_t u : candidates) {
+        __builtin_prefetch(&mesh_.pulse[u]);
+        __builtin_prefetch(&mesh_.record[u]);
+        __builtin_prefetch(&mesh_.vertex[u]);
+    }
     for (const uint32_t u : candidates)
         __builtin_prefetch(&mesh_.source().operation[mesh_.record[u].last]);
     for (size_t i = 0; i < candidates.size(); ++i) {
@@ -231,9 +241,14 @@ void Adaption::applySplits(std::span<Split> splits) {
     const std::vector<Operation>& operation = mesh_.source().operation;
     std::array<uint32_t, kTogether> vertices;
     std::array<Star, kTogether> stars;
+    for (const Split& s : splits) __builtin_prefetch(&mesh_.record[s.v], 1);
     for (size_t i = 0; i < splits.size(); ++i) {
         vertices[i] = splits[i].v;
         prefetch(splits[i].v, mesh_.record[splits[i].v].next);
+        prefetch(splits[i].u, 0);
+        __builtin_prefetch(&mesh_.pulse[splits[i].u], 1);
+        __builtin_prefetch(&mesh_.record[splits[i].u], 1);
+        for (const uint32_t f : splits[i].face) __builtin_prefetch(&mesh_.face[f], 1);
     }
     gather({vertices.data(), splits.size()}, stars.data());
     for (const Split& s : splits)
@@ -264,6 +279,7 @@ void Adaption::applyMerges(std::span<Merge> merges) {
     std::array<uint32_t, 2 * kTogether> vertices;
     std::array<Star, 2 * kTogether> stars;
     const size_t count = merges.size();
+    for (const Merge& m : merges) __builtin_prefetch(&mesh_.record[m.u]);
     for (size_t i = 0; i < count; ++i) {
         vertices[i] = merges[i].v;
         vertices[count + i] = merges[i].u;
