@@ -15,6 +15,7 @@
 #include "base/parallel.h"
 #include "methods/pmesh/adaption.h"
 #include "methods/pmesh/in_core_builder.h"
+#include "methods/pmesh/node_codec.h"
 #include "methods/pmesh/whole_mesh.h"
 
 namespace {
@@ -39,9 +40,12 @@ void report(const ProgressiveMesh& mesh, const BuildCounts& counts, double secon
     std::printf(
         "  built in %.2f s: base %zu vertices, %zu triangles; %zu operations, %llu dummies;"
         " %u levels; %llu irregular vertices\n",
-        seconds, mesh.base_vertex.size(), mesh.base_triangle.size(), mesh.operation.size(),
+        seconds, mesh.base_vertex.size(), mesh.base_triangle.size(), size_t(counts.operations),
         static_cast<unsigned long long>(counts.dummies), counts.levels,
         static_cast<unsigned long long>(counts.irregular_vertices));
+    std::printf("  %zu nodes, %.1f %% full, %u levels of them\n", counts.row.size(),
+                100.0 * double(counts.operations) / double(counts.row.size() * kNodeSlots),
+                counts.row.empty() ? 0 : counts.row.back().level + 1u);
     std::printf(
         "  refused by valence %llu, by level %llu; %llu ends inexact, by %u steps at most;"
         " resident %zu MiB\n",
@@ -49,6 +53,25 @@ void report(const ProgressiveMesh& mesh, const BuildCounts& counts, double secon
         static_cast<unsigned long long>(counts.refused.level),
         static_cast<unsigned long long>(counts.inexact_ends), counts.largest_error,
         peakResidentBytes() >> 20);
+}
+
+void reportPages(const ProgressiveMesh& mesh, const BuildCounts& counts) {
+    const NodeForest forest = toNodes(mesh, counts.row);
+    std::vector<std::vector<std::byte>> pages;
+    size_t bytes = encodeBase(forest).size();
+    const double begin = now();
+    for (const OperationNode& node : forest.node)
+        bytes += pages.emplace_back(encodeNode(node)).size();
+    const double encoded = now();
+    OperationNode node;
+    std::string fault;
+    for (NodeIndex n = 0; n < pages.size(); ++n)
+        if (!decodeNode(pages[n], n, forest.row[n], node, fault))
+            std::printf("%s\n", fault.c_str());
+    const double rate = 1e-6 * double(counts.operations);
+    std::printf("  pages: %.2f bytes an operation; %.2f M operations/s encoded, %.2f decoded\n",
+                double(bytes) / double(counts.operations), rate / (encoded - begin),
+                rate / (now() - encoded));
 }
 
 /// Passes to the end; operations a second.
@@ -151,6 +174,7 @@ void run(const char* path, int jobs) {
     const double begin = now();
     const ProgressiveMesh mesh = buildInCore(std::move(whole.mesh), whole.lattice, budget, &counts);
     report(mesh, counts, now() - begin);
+    reportPages(mesh, counts);
     Adaption adaption(mesh);
     for (int i = 0; i < 2; ++i) {
         settle("refine all", adaption, criterionOf(-1.0, mesh.lattice));

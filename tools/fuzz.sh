@@ -20,7 +20,7 @@ for target in "${targets[@]}"; do
     seeds=fuzz/corpus/${name#fuzz_}
     mkdir "$work/$name"
     # Models are written anew, as a stored one would be of an older format.
-    [[ $name != fuzz_model ]] || FUZZ_SEEDS=$work/$name "$target"
+    [[ ! $name =~ ^fuzz_(model|operations)$ ]] || FUZZ_SEEDS=$work/$name "$target"
     echo "== Fuzzing $name for $each s"
     "$target" -max_total_time="$each" -rss_limit_mb=2048 -timeout=10 -print_final_stats=1 \
         -artifact_prefix="$PWD/build/fuzz/$name-" "$work/$name" $([[ -d $seeds ]] && echo "$seeds") \

@@ -45,7 +45,7 @@ protected:
     /// A cut of the model as a mesh.
     void write(const std::string& name, const Cut& cut) const {
         const ModelReader model(pathTo("model"));
-        const auto writer = createMesh(pathTo(name), true, meshOutputOf(model, cut));
+        const auto writer = createMesh(pathTo(name), true, meshOutputOf(model.info(), cut.triangles));
         Budget budget(size_t(64) << 20);
         Progress progress;
         exportCut(model, cut, *writer, {directory_, 2}, budget, progress);

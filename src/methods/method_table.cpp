@@ -1,5 +1,10 @@
 #include "methods/method_table.h"
 
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "methods/pmesh/build.h"
+#include "methods/pmesh/model.h"
 #include "methods/tetra/build.h"
 
 namespace pietra {
@@ -7,13 +12,25 @@ namespace pietra {
 namespace {
 
 constexpr Method kMethods[] = {
-    {"tetra", "Adaptive TetraPuzzles: patches in a hierarchy of tetrahedra", tetra::build},
+    {"tetra", "Adaptive TetraPuzzles: patches in a hierarchy of tetrahedra", tetra::build, nullptr},
+    {"pmesh", "progressive mesh: every vertex split by itself, in memory so far", pmesh::build,
+     pmesh::openModel},
 };
 
 }  // namespace
 
 std::span<const Method> methods() {
     return kMethods;
+}
+
+std::unique_ptr<AdaptiveModel> openAdaptive(const ModelReader& reader) {
+    if (reader.hasPatches()) return nullptr;
+    const Method* method = findMethod(reader.info().method);
+    if (!method || !method->open)
+        throw InputError(
+            reader.path(), "",
+            fmt::format("its method, {}, is unknown to this program", reader.info().method));
+    return method->open(reader);
 }
 
 const Method* findMethod(std::string_view name) {

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "multires/method.h"
+#include "store/model_reader.h"
 
 namespace pietra {
 
@@ -12,5 +13,8 @@ namespace pietra {
 std::span<const Method> methods();
 /// Null where there is none of this name.
 const Method* findMethod(std::string_view name);
+
+/// Null for a model whose pages are patches. Throws InputError where the program lacks its method.
+std::unique_ptr<AdaptiveModel> openAdaptive(const ModelReader& reader);
 
 }  // namespace pietra

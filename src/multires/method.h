@@ -3,6 +3,7 @@
 // one row of the table in methods/method_table.h; nothing above src/methods knows its name.
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "base/progress.h"
 #include "geometry/lattice.h"
 #include "io/triangle_source.h"
+#include "multires/adaptive_model.h"
 
 namespace pietra {
 
@@ -40,6 +42,8 @@ struct BuildReport {
     std::vector<std::string> notes;  ///< sentences for the user
 };
 
+class ModelReader;
+
 struct Method {
     const char* name;     ///< as in --method and in the file
     const char* summary;  ///< one line for --help
@@ -47,6 +51,9 @@ struct Method {
     /// when it does. Stays within settings.memory_bytes. Output bytes depend on the input, the
     /// precision and the patch sizes alone.
     BuildReport (*build)(TriangleSource& source, const BuildSettings& settings, Progress& progress);
+    /// Null for a method whose pages are patches, of which the house makes cuts itself. The reader,
+    /// of a file of this method, must outlive the result. Throws InputError.
+    std::unique_ptr<AdaptiveModel> (*open)(const ModelReader& reader) = nullptr;
 };
 
 }  // namespace pietra

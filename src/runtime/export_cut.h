@@ -28,13 +28,17 @@ struct ExportReport {
 };
 
 /// How the mesh file of a cut of this model is to be opened.
-MeshOutput meshOutputOf(const ModelReader& model, const Cut& cut);
+MeshOutput meshOutputOf(const ModelInfo& model, uint64_t triangles);
 
 /// Writes the cut and finishes the file. Takes half of what `budget` has left, and 1.2 bits a
 /// vertex; throws MemoryError where that is too little. `progress`: a stage of exportSteps() units
 /// that the caller has begun.
 ExportReport exportCut(const ModelReader& model, const Cut& cut, MeshWriter& writer,
                        const ExportSettings& settings, Budget& budget, Progress& progress);
+
+/// The same of a mesh in memory, all of whose vertices are written.
+ExportReport exportMesh(const ModelInfo& model, const Mesh& mesh, MeshWriter& writer,
+                        Progress& progress);
 
 inline uint64_t exportSteps(const Cut& cut) {
     return 2 * cut.nodes.size();

@@ -122,7 +122,7 @@ ExportReport exportAll(const ModelReader& model, MemoryWriter& writer, size_t bu
 
 TEST_F(ExportTest, sharedVerticesAreWrittenOnceAndEdgesClose) {
     const ModelReader model(pathTo("sheet.pietra"));
-    MemoryWriter writer(meshOutputOf(model, finestCut(model.nodes())));
+    MemoryWriter writer(meshOutputOf(model.info(), finestCut(model.nodes()).triangles));
     const ExportReport report = exportAll(model, writer, size_t(64) << 20);
     EXPECT_TRUE(writer.finished);
     constexpr uint64_t side = kPatches * kSide;
@@ -144,8 +144,8 @@ TEST_F(ExportTest, sharedVerticesAreWrittenOnceAndEdgesClose) {
 
 TEST_F(ExportTest, memoryChangesNothing) {
     const ModelReader model(pathTo("sheet.pietra"));
-    MemoryWriter all(meshOutputOf(model, finestCut(model.nodes()))),
-        tight(meshOutputOf(model, finestCut(model.nodes())));
+    MemoryWriter all(meshOutputOf(model.info(), finestCut(model.nodes()).triangles)),
+        tight(meshOutputOf(model.info(), finestCut(model.nodes()).triangles));
     exportAll(model, all, size_t(64) << 20);
     exportAll(model, tight, 200'000);
     EXPECT_EQ(tight.position, all.position);

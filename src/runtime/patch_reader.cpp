@@ -1,5 +1,7 @@
 #include "runtime/patch_reader.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -9,6 +11,14 @@
 #include "base/parallel.h"
 
 namespace pietra {
+
+void requirePatches(const ModelReader& model) {
+    if (!model.hasPatches())
+        throw InputError(model.path(), "",
+                         fmt::format("models of the method {} cannot be drawn yet; pietra extract "
+                                     "makes meshes of them",
+                                     model.info().method));
+}
 
 std::vector<PageRun> pageRuns(std::span<const Node> table, std::span<const NodeIndex> nodes) {
     std::vector<PageRun> runs;

@@ -15,6 +15,10 @@
 
 namespace pietra {
 
+/// Throws InputError where the model's pages are not patches, which nothing here and nothing that
+/// draws can read.
+void requirePatches(const ModelReader& model);
+
 /// Consecutive nodes of the list that lie in one page.
 struct PageRun {
     uint32_t page = 0;

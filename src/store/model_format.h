@@ -22,6 +22,7 @@ enum class SectionKind : uint32_t {
     kNone = 0,
     kAttributes = 1,  ///< what vertices carry besides position and normal
     kDirectory = 2,   ///< BlockEntry array
+    kMethod = 3,      ///< the method's own; pages are not patches where it is there
 };
 /// A reader that does not know a section with this flag must refuse the file.
 inline constexpr uint32_t kSectionRequired = 1;

@@ -63,6 +63,9 @@ ModelReader::ModelReader(const std::string& path) : file_(path, File::Mode::kRea
     const std::vector<std::byte> attributes = readSection(header, SectionKind::kAttributes);
     if (!decodeAttributes(attributes, info_.schema, fault)) fail(header.sections[0].offset, fault);
 
+    if (hasSection(header, SectionKind::kMethod))
+        method_section_ = readSection(header, SectionKind::kMethod);
+
     std::vector<BlockEntry> directory;
     readDirectory(header, directory);
     levels_.resize(header.levels);
@@ -112,11 +115,18 @@ void ModelReader::readHeader(FileHeader& header) {
     for (uint32_t i = 0; i < header.section_count; ++i) {
         const SectionEntry& section = header.sections[i];
         const bool known = section.kind == uint32_t(SectionKind::kAttributes) ||
-                           section.kind == uint32_t(SectionKind::kDirectory);
+                           section.kind == uint32_t(SectionKind::kDirectory) ||
+                           section.kind == uint32_t(SectionKind::kMethod);
         if (!known && (section.flags & kSectionRequired) != 0)
             fail(offsetof(FileHeader, sections) + i * sizeof section,
                  fmt::format("section kind {} is unknown to this version", section.kind));
     }
+}
+
+bool ModelReader::hasSection(const FileHeader& header, SectionKind kind) {
+    const auto sections = std::span(header.sections).first(header.section_count);
+    return std::any_of(sections.begin(), sections.end(),
+                       [&](const SectionEntry& s) { return s.kind == uint32_t(kind); });
 }
 
 std::vector<std::byte> ModelReader::readSection(const FileHeader& header, SectionKind kind) const {
@@ -248,6 +258,7 @@ void ModelReader::readPage(uint32_t page, std::vector<std::byte>& bytes) const {
 
 bool ModelReader::tryDecode(uint32_t page, std::span<const std::byte> bytes,
                             std::vector<Mesh>& patches, std::string& fault) const {
+    if (!hasPatches()) return fault = fmt::format("page {} holds no patches", page), false;
     const PageInfo& info = pages_[page];
     uint64_t vertices = 0, triangles = 0;
     for (uint32_t i = 0; i < info.node_count; ++i) {

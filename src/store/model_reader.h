@@ -44,6 +44,10 @@ public:
     uint32_t formatVersion() const { return kFormatVersion; }
     uint64_t fileBytes() const { return file_bytes_; }
     PageSettings pageSettings() const;
+    /// Pages hold patches: decode() and the like may be called. Else they are the method's own, as
+    /// is its section, and a node counts what its method says.
+    bool hasPatches() const { return method_section_.empty(); }
+    std::span<const std::byte> methodSection() const { return method_section_; }
 
     /// By level from the root (level 0) on; node i of the model is nodes()[i].
     std::span<const Node> nodes() const { return nodes_; }
@@ -64,6 +68,7 @@ public:
 
 private:
     void readHeader(FileHeader& header);
+    static bool hasSection(const FileHeader& header, SectionKind kind);
     std::vector<std::byte> readSection(const FileHeader& header, SectionKind kind) const;
     void readDirectory(const FileHeader& header, std::vector<BlockEntry>& directory) const;
     void readBlock(const BlockEntry& entry);
@@ -78,6 +83,7 @@ private:
     std::vector<Node> nodes_;
     std::vector<PageInfo> pages_;
     std::vector<LevelRange> levels_;
+    std::vector<std::byte> method_section_;
 };
 
 /// Whether a regular file begins as a model does; false too where it cannot be read.

@@ -165,7 +165,8 @@ bool ModelWriter::fitsFront(const Level& level) const {
 
 void ModelWriter::writeHeader(const ModelInfo& info, const ModelIdentity& identity,
                               std::span<const BlockEntry> directory,
-                              std::span<const std::byte> attributes) {
+                              std::span<const std::byte> attributes,
+                              std::span<const std::byte> method_section) {
     FileHeader header;
     header.header_bytes = sizeof header;
     header.method_format = identity.method_format;
@@ -203,11 +204,13 @@ void ModelWriter::writeHeader(const ModelInfo& info, const ModelIdentity& identi
     };
     section(SectionKind::kAttributes, attributes);
     section(SectionKind::kDirectory, bytesOf(directory));
+    if (!method_section.empty()) section(SectionKind::kMethod, method_section);
     header.checksum = hashBytes(&header, offsetof(FileHeader, checksum));
     output_.file().writeAt(0, &header, sizeof header);
 }
 
-void ModelWriter::finish(const ModelInfo& info, const ModelIdentity& identity) {
+void ModelWriter::finish(const ModelInfo& info, const ModelIdentity& identity,
+                         std::span<const std::byte> method_section) {
     CHECK(!levels_.empty() && levels_.back().pages > 0);
     CHECK_EQ(level_, 0u);
     pages_.flush();
@@ -215,7 +218,8 @@ void ModelWriter::finish(const ModelInfo& info, const ModelIdentity& identity) {
     std::vector<BlockEntry> directory;
     numberLevels(directory);
     const std::vector<std::byte> attributes = encodeAttributes(info.schema);
-    position_ = sizeof(FileHeader) + attributes.size() + directory.size() * sizeof(BlockEntry);
+    position_ = sizeof(FileHeader) + attributes.size() + directory.size() * sizeof(BlockEntry) +
+                method_section.size();
 
     // The front: whole levels with their nodes and pages. Then all other nodes, then all other
     // pages.
@@ -234,7 +238,7 @@ void ModelWriter::finish(const ModelInfo& info, const ModelIdentity& identity) {
     }
     for (size_t i = front; i < count; ++i) writeBlocks(levelAt(i), blocks[i]);
     for (size_t i = front; i < count; ++i) writePages(levelAt(i), blocks[i]);
-    writeHeader(info, identity, directory, attributes);
+    writeHeader(info, identity, directory, attributes, method_section);
     output_.commit();
 }
 

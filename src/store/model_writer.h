@@ -39,15 +39,17 @@ public:
     /// Levels come in the order L, L-1, ..., 0, each once, with one page at least.
     void beginLevel(uint32_t level);
 
-    /// `encoded` is a page of encodePage() with as many patches as there are `nodes`, in their
-    /// order. A node's child[] are positions in the level before (level + 1), counted from 0 in
-    /// order of arrival, or kNoNode. Sets page (counted in this level), patch and level of the
-    /// nodes.
+    /// `encoded` is a page of encodePage(), or of the method's own, with as many patches as there
+    /// are `nodes`, in their order. A node's child[] are positions in the level before (level + 1),
+    /// counted from 0 in order of arrival, or kNoNode. Sets page (counted in this level), patch and
+    /// level of the nodes.
     void addPage(std::span<const std::byte> encoded, std::span<Node> nodes);
 
     /// Puts the file together, syncs and renames it. levels and triangles_stored of `info` are
-    /// taken from what arrived. Nothing may be called afterwards.
-    void finish(const ModelInfo& info, const ModelIdentity& identity = {});
+    /// taken from what arrived. `method_section`: empty, or the method's own, and then pages are
+    /// too (ModelReader::hasPatches). Nothing may be called afterwards.
+    void finish(const ModelInfo& info, const ModelIdentity& identity = {},
+                std::span<const std::byte> method_section = {});
 
     uint64_t pageBytes() const { return page_bytes_; }
     uint64_t nodeCount() const { return node_count_; }
@@ -80,7 +82,8 @@ private:
     void writeBlocks(const Level& level, std::span<BlockEntry> blocks);
     void writePages(const Level& level, std::span<BlockEntry> blocks);
     void writeHeader(const ModelInfo& info, const ModelIdentity& identity,
-                     std::span<const BlockEntry> directory, std::span<const std::byte> attributes);
+                     std::span<const BlockEntry> directory, std::span<const std::byte> attributes,
+                     std::span<const std::byte> method_section);
     bool fitsFront(const Level& level) const;
 
     Reservation memory_;

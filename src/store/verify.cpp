@@ -151,7 +151,8 @@ void countFindings(const ModelReader& model, const std::vector<std::string>& pag
 
 }  // namespace
 
-VerifyReport verifyModel(const ModelReader& model, Progress& progress) {
+VerifyReport verifyModel(const ModelReader& model, Progress& progress,
+                         const PageCheck& check_page) {
     const std::span<const Node> nodes = model.nodes();
     std::vector<uint8_t> found(nodes.size(), 0);
     checkForest(nodes, found);
@@ -166,7 +167,11 @@ VerifyReport verifyModel(const ModelReader& model, Progress& progress) {
     std::vector<std::string> page_faults(model.pageCount());
     parallelFor(model.pageCount(), [&](size_t page) {
         Scratch& local = scratch.local();
-        page_faults[page] = checkPage(model, uint32_t(page), local.bytes, local.patches, found);
+        std::string& fault = page_faults[page];
+        if (!check_page)
+            fault = checkPage(model, uint32_t(page), local.bytes, local.patches, found);
+        else if (model.tryReadPage(uint32_t(page), local.bytes, fault))
+            fault = check_page(uint32_t(page));
         progress.tick();
     });
 

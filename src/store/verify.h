@@ -7,6 +7,7 @@
 // table it takes some twelve bytes a node. The result does not depend on the number of threads.
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -47,8 +48,13 @@ struct VerifyReport {
 };
 inline constexpr size_t kMaxFaultTexts = 20;
 
+/// Empty, or a sentence about what is wrong with a page, whose checksum is good; thread-safe.
+using PageCheck = std::function<std::string(uint32_t page)>;
+
+/// `check_page`: for models whose pages are not patches (ModelReader::hasPatches).
 /// Ticks `progress` (a stage the caller has begun) once a page. Throws Interrupted and IoError
 /// only.
-VerifyReport verifyModel(const ModelReader& model, Progress& progress);
+VerifyReport verifyModel(const ModelReader& model, Progress& progress,
+                         const PageCheck& check_page = {});
 
 }  // namespace pietra

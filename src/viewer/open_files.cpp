@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/hash.h"
+#include "runtime/patch_reader.h"
 
 namespace pietra {
 namespace fs = std::filesystem;
@@ -52,6 +53,7 @@ void OpenFiles::open(const std::string& path, bool build_now) {
     const std::string model = isModelFile(path) ? path : modelPathOf(path);
     if (model == path || isModelOf(model, path)) {
         models_.push_back(std::make_unique<ModelReader>(model));
+        requirePatches(*models_.back());
     } else if (build_now) {
         build(path);
     } else {

@@ -4,12 +4,15 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <set>
 
 #include "audit/certificate.h"
 #include "audit/cracks.h"
+#include "audit/mesh_topology.h"
 #include "base/error.h"
 #include "methods/method_table.h"
 #include "multires/cut.h"
@@ -53,6 +56,8 @@ class Conformance : public testing::TestWithParam<std::tuple<size_t, size_t>> {
 protected:
     const Method& method() const { return methods()[std::get<0>(GetParam())]; }
     const ConformanceMesh& mesh() const { return meshes()[std::get<1>(GetParam())]; }
+    /// Adaptive methods keep all components of a model, however small.
+    bool hasLevels() const { return !method().open || mesh().name != "dust"; }
 
     BuildReport build(const std::string& name, int jobs = 2, size_t memory = size_t(1) << 30) {
         BuildSettings settings;
@@ -74,9 +79,44 @@ protected:
         };
     }
 
+    VerifyReport verify(const ModelReader& model) const {
+        Progress progress;
+        const auto adaptive = openAdaptive(model);
+        if (!adaptive) return verifyModel(model, progress);
+        return verifyModel(model, progress,
+                           [&](uint32_t page) { return adaptive->pageFault(page); });
+    }
+
     Scratch scratch_;
     Budget budget_{size_t(512) << 20};
 };
+
+/// Whose pages are patches, and whose are not.
+class PatchConformance : public Conformance {};
+class AdaptiveConformance : public Conformance {
+protected:
+    void SetUp() override {
+        build("model");
+        model_.emplace(scratch_.file("model"));
+        adaptive_ = openAdaptive(*model_);
+    }
+    Mesh cut(const CutRequest& request) { return adaptive_->cut(request, budget_).mesh; }
+    Mesh coarsest() {
+        CutRequest request;
+        request.max_triangles = 0;
+        return cut(request);
+    }
+
+    std::optional<ModelReader> model_;
+    std::unique_ptr<AdaptiveModel> adaptive_;
+};
+
+std::vector<size_t> methodsThat(bool have_patches) {
+    std::vector<size_t> indices;
+    for (size_t i = 0; i < methods().size(); ++i)
+        if ((methods()[i].open == nullptr) == have_patches) indices.push_back(i);
+    return indices;
+}
 
 std::string parameterName(const testing::TestParamInfo<std::tuple<size_t, size_t>>& info) {
     std::string name = std::string(methods()[std::get<0>(info.param)].name) + "_" +
@@ -89,19 +129,28 @@ INSTANTIATE_TEST_SUITE_P(AllMethods, Conformance,
                          testing::Combine(testing::Range(size_t(0), methods().size()),
                                           testing::Range(size_t(0), size_t(4))),
                          parameterName);
+INSTANTIATE_TEST_SUITE_P(AllMethods, PatchConformance,
+                         testing::Combine(testing::ValuesIn(methodsThat(true)),
+                                          testing::Range(size_t(0), size_t(4))),
+                         parameterName);
+INSTANTIATE_TEST_SUITE_P(AllMethods, AdaptiveConformance,
+                         testing::Combine(testing::ValuesIn(methodsThat(false)),
+                                          testing::Range(size_t(0), size_t(4))),
+                         parameterName);
 
 TEST_P(Conformance, errorsAreMonotoneAndBoundsNested) {
     build("model");
     const ModelReader model(scratch_.file("model"));
-    Progress progress;
-    const VerifyReport report = verifyModel(model, progress);
+    const VerifyReport report = verify(model);
     EXPECT_TRUE(report.ok()) << (report.faults.empty() ? "" : report.faults[0]);
     EXPECT_EQ(report.pages.checked, model.pageCount());
-    EXPECT_GT(model.info().levels, 3u);
+    if (hasLevels()) {
+        EXPECT_GT(model.info().levels, 3u);
+    }
     EXPECT_LE(rootCut(model.nodes()).triangles, 1500u);
 }
 
-TEST_P(Conformance, anyValidCutIsCrackFree) {
+TEST_P(PatchConformance, anyValidCutIsCrackFree) {
     build("model");
     const ModelReader model(scratch_.file("model"));
     std::set<uint64_t> sizes;
@@ -118,7 +167,7 @@ TEST_P(Conformance, anyValidCutIsCrackFree) {
     EXPECT_GT(sizes.size(), 10u);
 }
 
-TEST_P(Conformance, finestCutIsTheInput) {
+TEST_P(PatchConformance, finestCutIsTheInput) {
     const BuildReport report = build("model");
     const ModelReader model(scratch_.file("model"));
     const Lattice& lattice = model.info().lattice;
@@ -164,7 +213,7 @@ TEST_P(Conformance, bytesDoNotDependOnThreadsOrMemory) {
     EXPECT_TRUE(bytesOf(scratch_.file("little")) == one);
 }
 
-TEST_P(Conformance, statedErrorsHoldAgainstTheFinestCut) {
+TEST_P(PatchConformance, statedErrorsHoldAgainstTheFinestCut) {
     build("model");
     const ModelReader model(scratch_.file("model"));
     std::vector<Cut> cuts = {rootCut(model.nodes())};
@@ -181,7 +230,7 @@ TEST_P(Conformance, statedErrorsHoldAgainstTheFinestCut) {
     EXPECT_GT(reports[0].worstRatio(), 0.15);  // a bound, but no idle one
 }
 
-TEST_P(Conformance, fromWithinNothingIsCulled) {
+TEST_P(PatchConformance, fromWithinNothingIsCulled) {
     build("model");
     const ModelReader model(scratch_.file("model"));
     const Box3i& box = model.info().bounds;
@@ -212,8 +261,7 @@ TEST_P(Conformance, damageIsFound) {
         std::ofstream(scratch_.file("bad"), std::ios::binary) << bytes;
         try {
             const ModelReader model(scratch_.file("bad"));
-            Progress progress;
-            return !verifyModel(model, progress).ok();
+            return !verify(model).ok();
         } catch (const InputError&) {
             return true;
         }
@@ -226,6 +274,79 @@ TEST_P(Conformance, damageIsFound) {
         flipped[at] = char(flipped[at] ^ (1 << part % 8));
         EXPECT_TRUE(rejected(flipped)) << "byte " << at;
     }
+}
+
+TEST_P(AdaptiveConformance, allCutsHaveOneTopology) {
+    EXPECT_EQ(adaptive_->modelFault(budget_), "");
+    const MeshTopology expected = topologyOf(coarsest());
+    std::set<size_t> sizes;
+    for (const double pixels : {0.1, 0.5, 2.0, 10.0, 50.0})
+        for (const double distance : {0.7, 3.0}) {
+            Camera camera;
+            camera.target = Vec3d(0.5);
+            camera.eye = camera.target + distance * Vec3d(0.3, -0.8, 0.5);
+            CutRequest request;
+            request.view.emplace(camera, PictureSize{}, model_->info().lattice);
+            request.pixels = pixels;
+            const Mesh mesh = cut(request);
+            sizes.insert(mesh.triangleCount());
+            EXPECT_EQ(topologyOf(mesh), expected);
+        }
+    if (hasLevels()) {
+        EXPECT_GT(sizes.size(), 4u);
+    }
+}
+
+/// Connectivity exactly; places as the quantisation error says.
+TEST_P(AdaptiveConformance, theFinestIsTheInput) {
+    const ModelInfo& info = model_->info();
+    const Mesh finest = cut({});
+    EXPECT_EQ(finest.triangleCount(),
+              info.input_triangles - info.dropped_degenerate - info.dropped_duplicate);
+    std::vector<Vec3d> corners;
+    for (const Vec3i& p : finest.position) corners.push_back(Vec3d(p));
+    for (const auto& t : mesh().triangles)
+        for (const uint64_t v : t) {
+            const Vec3d p = info.lattice.toLattice(mesh().vertices.position[v]);
+            const auto near = [&](const Vec3d& q) {
+                return glm::length(p - q) <= double(info.quantisation_error) * (1 + 1e-6);
+            };
+            if (std::none_of(corners.begin(), corners.end(), near)) {
+                FAIL() << p.x << " " << p.y << " " << p.z;
+            }
+            if (v > 2000) break;  // quadratic
+        }
+}
+
+TEST_P(AdaptiveConformance, finerIsNeverCoarser) {
+    size_t before = 0;
+    double stated_before = HUGE_VAL;
+    const double most = rootCut(model_->nodes()).max_error;
+    for (double error = most; error > most / 1e4; error /= 3) {
+        CutRequest request;
+        request.max_error = error;
+        const MeshCut found = adaptive_->cut(request, budget_);
+        EXPECT_GE(found.mesh.triangleCount(), before);
+        EXPECT_LE(found.max_error, stated_before);
+        EXPECT_TRUE(found.max_error <= error || found.below_finest);
+        before = found.mesh.triangleCount();
+        stated_before = found.max_error;
+        request = {};
+        request.max_triangles = before;
+        EXPECT_LE(adaptive_->cut(request, budget_).max_error, found.max_error);
+    }
+    const size_t least = coarsest().triangleCount();
+    CutRequest request;
+    request.max_triangles = least;
+    EXPECT_EQ(cut(request).triangleCount(), least);
+    EXPECT_FALSE(adaptive_->cut(request, budget_).over_budget);
+    request.max_triangles = least - 1;
+    EXPECT_TRUE(adaptive_->cut(request, budget_).over_budget);
+}
+
+TEST_P(AdaptiveConformance, tooLittleMemorySaysHowMuch) {
+    Budget little(hasLevels() ? size_t(1) << 20 : 0);
+    EXPECT_THROW(adaptive_->cut({}, little), MemoryError);
 }
 
 }  // namespace

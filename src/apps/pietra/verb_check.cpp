@@ -8,10 +8,11 @@
 #include "apps/pietra/limits.h"
 #include "apps/pietra/logging.h"
 #include "apps/pietra/verbs.h"
-#include "audit/model_check.h"
+#include "audit/adaptive_check.h"
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/text.h"
+#include "methods/method_table.h"
 #include "runtime/patch_reader.h"
 
 namespace pietra {
@@ -157,11 +158,15 @@ std::string CheckVerb::tempDir() const {
 int CheckVerb::run(const RunContext& context) {
     const ThreadLimit threads(limits_.threads());
     const ModelReader model(file_);
-    const size_t taken = kProgramBytes + model.nodes().size() * (sizeof(Node) + 64) +
-                         2 * size_t(limits_.threads()) * largestDecodedPageBytes(model);
+    const auto adaptive = openAdaptive(model);
+    const size_t taken =
+        kProgramBytes + model.nodes().size() * (sizeof(Node) + 64) +
+        (adaptive ? 0 : 2 * size_t(limits_.threads()) * largestDecodedPageBytes(model));
     Budget budget(limits_.memoryBytes(taken + kWorkBytes, "checking this model") - taken);
+    const ModelCheckSettings settings{cuts_, seed_, samples_, input_, tempDir()};
     const ModelCheckReport report =
-        checkModel(model, {cuts_, seed_, samples_, input_, tempDir()}, budget, context.progress);
+        adaptive ? checkAdaptive(model, *adaptive, settings, budget, context.progress)
+                 : checkModel(model, settings, budget, context.progress);
     for (const std::string& fault : report.file.faults) logWarning(fault);
     for (const std::string& fault : report.faults) logWarning(fault);
     if (json_)

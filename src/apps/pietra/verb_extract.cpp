@@ -15,6 +15,7 @@
 #include "base/parallel.h"
 #include "base/text.h"
 #include "io/mesh_writer.h"
+#include "methods/method_table.h"
 #include "multires/cut.h"
 #include "runtime/export_cut.h"
 #include "runtime/patch_reader.h"
@@ -40,6 +41,10 @@ public:
 
 private:
     Cut select(const ModelReader& model) const;
+    CutRequest request(const Lattice& lattice) const;
+    ExportReport writeCut(const ModelReader& model, double& max_error, const RunContext& context);
+    ExportReport writeAdaptive(const ModelReader& model, AdaptiveModel& adaptive, double& max_error,
+                               const RunContext& context);
     size_t budgetBytes(const ModelReader& model, size_t in_flight) const;
     std::string tempDir() const;
 
@@ -111,6 +116,58 @@ size_t ExtractVerb::budgetBytes(const ModelReader& model, size_t in_flight) cons
     return limits_.memoryBytes(taken + (size_t(16) << 20), "extracting from this model") - taken;
 }
 
+CutRequest ExtractVerb::request(const Lattice& lattice) const {
+    CutRequest request;
+    if (error_) request.max_error = latticeError(*error_, lattice);
+    request.max_triangles = triangles_;
+    if (camera_.fileGiven()) request.view.emplace(camera_.fromFile(), size_, lattice);
+    request.pixels = pixels_;
+    return request;
+}
+
+void warnAbout(bool below_finest, bool over_budget, double max_error, uint64_t triangles) {
+    if (below_finest)
+        logWarning(fmt::format(
+            "no part of the model states less than {:.6g}: the finest is written", max_error));
+    if (over_budget)
+        logWarning(fmt::format(
+            "the coarsest form has {} triangles, more than asked for: it is written", triangles));
+}
+
+ExportReport ExtractVerb::writeCut(const ModelReader& model, double& max_error,
+                                   const RunContext& context) {
+    const size_t in_flight = size_t(limits_.threads()) + 1;
+    Budget budget(budgetBytes(model, in_flight));
+    const Cut cut = select(model);
+    max_error = cut.max_error * model.info().lattice.step;
+    warnAbout(cut.below_finest, cut.over_budget, max_error, cut.triangles);
+    const auto writer =
+        createMesh(output_, context.common.force, meshOutputOf(model.info(), cut.triangles));
+    context.progress.beginStage("extract", exportSteps(cut));
+    const ExportReport report =
+        exportCut(model, cut, *writer, {tempDir(), in_flight}, budget, context.progress);
+    context.progress.endStage();
+    for (const std::string& note : writer->notes()) logWarning(note);
+    return report;
+}
+
+ExportReport ExtractVerb::writeAdaptive(const ModelReader& model, AdaptiveModel& adaptive,
+                                        double& max_error, const RunContext& context) {
+    const size_t taken = kProgramBytes + model.nodes().size() * sizeof(Node);
+    Budget budget(limits_.memoryBytes(taken, "extracting from this model") - taken);
+    context.progress.beginStage("extract", 0);
+    const MeshCut cut = adaptive.cut(request(model.info().lattice), budget);
+    max_error = cut.max_error * model.info().lattice.step;
+    const uint64_t triangles = cut.mesh.triangleCount();
+    warnAbout(cut.below_finest, cut.over_budget, max_error, triangles);
+    const auto writer =
+        createMesh(output_, context.common.force, meshOutputOf(model.info(), triangles));
+    const ExportReport report = exportMesh(model.info(), cut.mesh, *writer, context.progress);
+    context.progress.endStage();
+    for (const std::string& note : writer->notes()) logWarning(note);
+    return report;
+}
+
 int ExtractVerb::run(const RunContext& context) {
     const int ways = int(error_.has_value()) + int(triangles_.has_value()) + int(full_) +
                      int(camera_.fileGiven());
@@ -118,26 +175,12 @@ int ExtractVerb::run(const RunContext& context) {
         throw UsageError("give one of --error, --triangles, --full and --camera, to say how fine");
     checkOutput(output_, context.common.force);
     const ThreadLimit threads(limits_.threads());
-    const size_t in_flight = size_t(limits_.threads()) + 1;
     const ModelReader model(file_);
-    Budget budget(budgetBytes(model, in_flight));
-    const Cut cut = select(model);
-    const double max_error = cut.max_error * model.info().lattice.step;
-    if (cut.below_finest)
-        logWarning(fmt::format(
-            "no part of the model states less than {:.6g}: the finest is written", max_error));
-    if (cut.over_budget)
-        logWarning(
-            fmt::format("the coarsest form has {} triangles, more than asked for: it is written",
-                        cut.triangles));
-
-    const auto writer = createMesh(output_, context.common.force, meshOutputOf(model, cut));
+    const auto adaptive = openAdaptive(model);
+    double max_error = 0;
     context.progress.setStages(1);
-    context.progress.beginStage("extract", exportSteps(cut));
-    const ExportReport report =
-        exportCut(model, cut, *writer, {tempDir(), in_flight}, budget, context.progress);
-    context.progress.endStage();
-    for (const std::string& note : writer->notes()) logWarning(note);
+    const ExportReport report = adaptive ? writeAdaptive(model, *adaptive, max_error, context)
+                                         : writeCut(model, max_error, context);
     logInfo(fmt::format("{}: {} triangles, {} vertices, error at most {:.6g}", output_,
                         report.triangles, report.vertices, max_error));
     writeReport(

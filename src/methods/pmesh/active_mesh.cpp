@@ -462,7 +462,7 @@ std::string validateStars(const ProgressiveMesh& mesh) {
     std::vector<uint32_t> vertex_of(mesh.operation.size());
     for (uint32_t v = 0; v < active.vertexCount(); ++v)
         if (active.record[v].next != kNoOperation) vertex_of[active.record[v].next] = v;
-    for (OperationId id = 0; id < mesh.operation.size(); ++id) {
+    for (const OperationId id : coarseToFine(mesh)) {
         const Operation& o = mesh.operation[id];
         const uint32_t v = vertex_of[id];
         if (active.pulse[v].corner == kNoCorner)

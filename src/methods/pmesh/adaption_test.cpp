@@ -20,25 +20,27 @@ INSTANTIATE_TEST_SUITE_P(Pmesh, Adapted, testing::ValuesIn(testMeshes()),
 struct Reference {
     std::vector<std::vector<OperationId>> needs;
     std::vector<Vec3i> centre;
+    std::vector<OperationId> order;
 
-    explicit Reference(const ProgressiveMesh& source) {
+    explicit Reference(const ProgressiveMesh& source)
+        : needs(source.operation.size()),
+          centre(source.operation.size()),
+          order(coarseToFine(source)) {
         ActiveMesh mesh(source);
         std::map<OperationId, uint32_t> waiting;
         const auto wait = [&](uint32_t v) {
             if (mesh.record[v].next != kNoOperation) waiting[mesh.record[v].next] = v;
         };
         for (uint32_t v = 0; v < mesh.vertexCount(); ++v) wait(v);
-        for (OperationId id = 0; id < source.operation.size(); ++id) {
+        for (const OperationId id : order) {
             const uint32_t v = waiting.at(id);
-            needs.emplace_back();
             const auto need = [&](uint32_t w) {
-                if (mesh.record[w].last != kNoOperation)
-                    needs.back().push_back(mesh.record[w].last);
+                if (mesh.record[w].last != kNoOperation) needs[id].push_back(mesh.record[w].last);
                 return true;
             };
             need(v);
             mesh.allNeighbours(v, need);
-            centre.push_back(mesh.vertex[v].position());
+            centre[id] = mesh.vertex[v].position();
             EXPECT_TRUE(mesh.apply(v));
             wait(v);
             if (!source.operation[id].isDummy()) wait(uint32_t(mesh.vertexCount() - 1));
@@ -47,7 +49,8 @@ struct Reference {
 
     std::vector<uint8_t> closure(const ProgressiveMesh& source, const Criterion& criterion) const {
         std::vector<uint8_t> in(needs.size(), 0);
-        for (size_t o = needs.size(); o-- > 0;) {
+        for (size_t i = order.size(); i-- > 0;) {
+            const OperationId o = order[i];
             const Operation& op = source.operation[o];
             in[o] |= criterion.needs(centre[o], op.error, op.radius);
             if (in[o])

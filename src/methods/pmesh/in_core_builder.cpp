@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "methods/pmesh/active_mesh.h"
+#include "methods/pmesh/node_packer.h"
 #include "simplify/simplify.h"
 
 namespace pietra::pmesh {
@@ -63,16 +64,21 @@ public:
         mesh_.lattice = lattice;
     }
 
-    void run() {
+    std::vector<NodeRow> run() {
         makeBase();
         orderOperations();
+        Packing packing = pack();
+        listOperations(packing.id_of);
         encodeStars();
         saturate();
+        return std::move(packing.row);
     }
 
 private:
     void makeBase();
     void orderOperations();
+    Packing pack();
+    void listOperations(std::span<const OperationId> id_of);
     void encodeStars();
     void encode(ActiveMesh& active, OperationId id, const CollapseRecord& r);
     void encodeDummy(ActiveMesh& active, OperationId id, const CollapseRecord& r);
@@ -82,8 +88,10 @@ private:
     const Recorder& recorder_;
     const SimplifyOutput& base_;
     int shift_;
-    std::vector<uint32_t> order_;    // operations' records
-    std::vector<uint32_t> slot_of_;  // input vertices in the active mesh
+    std::vector<uint32_t> order_;     // operations' records
+    std::vector<uint32_t> place_of_;  // the inverse
+    std::vector<OperationId> id_;     // one an operation, in that order
+    std::vector<uint32_t> slot_of_;   // input vertices in the active mesh
     ProgressiveMesh& mesh_;
     BuildCounts& counts_;
 };
@@ -110,22 +118,45 @@ void Encoder::orderOperations() {
     std::iota(order_.rbegin(), order_.rend(), 0u);
     std::stable_sort(order_.begin(), order_.end(),
                      [&](uint32_t a, uint32_t b) { return records[a].height > records[b].height; });
-    std::vector<OperationId> id_of(records.size());
-    for (OperationId id = 0; id < order_.size(); ++id) id_of[order_[id]] = id;
-    const auto idOf = [&](uint32_t record) {
-        return record == kNoOperation ? record : id_of[record];
-    };
-    mesh_.operation.resize(records.size());
-    for (OperationId id = 0; id < order_.size(); ++id) {
-        const CollapseRecord& r = records[order_[id]];
-        Operation& o = mesh_.operation[id];
+}
+
+Packing Encoder::pack() {
+    const std::vector<CollapseRecord>& records = recorder_.records();
+    place_of_.resize(records.size());
+    for (uint32_t i = 0; i < order_.size(); ++i) place_of_[order_[i]] = i;
+    const auto placeOf = [&](uint32_t r) { return r == kNoOperation ? r : place_of_[r]; };
+    std::vector<PackOperation> operations(records.size());
+    for (uint32_t i = 0; i < order_.size(); ++i) {
+        const CollapseRecord& r = records[order_[i]];
+        operations[i] = {{placeOf(r.child[0]), placeOf(r.child[1])}, r.deviation, {}};
+        operations[i].box.add(r.position[0]);
+        if (r.u != kNoVertex) operations[i].box.add(r.position[1]);
+    }
+    std::vector<uint32_t> roots;
+    for (uint32_t v = 0; v < slot_of_.size(); ++v)
+        if (slot_of_[v] != kNoVertex && recorder_.lastOf(v) != kNoOperation)
+            roots.push_back(placeOf(recorder_.lastOf(v)));
+    return packOperations(operations, roots);
+}
+
+/// What is known of them without their stars.
+void Encoder::listOperations(std::span<const OperationId> id_of) {
+    const std::vector<CollapseRecord>& records = recorder_.records();
+    id_.assign(id_of.begin(), id_of.end());
+    const auto idOf = [&](uint32_t r) { return r == kNoOperation ? r : id_of[place_of_[r]]; };
+    const OperationId last = id_.empty() ? 0 : *std::max_element(id_.begin(), id_.end()) + 1;
+    Operation none{};
+    none.child = {kNoOperation, kNoOperation};
+    mesh_.operation.assign(last, none);
+    for (uint32_t i = 0; i < order_.size(); ++i) {
+        const CollapseRecord& r = records[order_[i]];
+        Operation& o = mesh_.operation[id_[i]];
         o.child = {idOf(r.child[0]), idOf(r.child[1])};
         o.level = uint16_t(recorder_.largestHeight() - r.height);
         o.normal = r.normal;
-        o.radius = o.error = 0;
         o.ranks = r.u == kNoVertex ? Operation::kDummyRanks : uint8_t(0);
     }
-    for (OperationId id = 0; id < order_.size(); ++id)
+    for (const OperationId id : id_)
         for (const int end : {0, 1}) {
             const OperationId child = mesh_.operation[id].childOf(end);
             if (child != kNoOperation && mesh_.operation[child].isDummy())
@@ -138,11 +169,12 @@ void Encoder::orderOperations() {
 
 void Encoder::encodeStars() {
     ActiveMesh active(mesh_);
-    const size_t count = mesh_.operation.size();
+    const size_t count = order_.size();
     active.resize(active.vertexCount() + count, active.faceCount() + 2 * count);
     active.resize(mesh_.base_vertex.size(), mesh_.base_triangle.size());
-    for (OperationId id = 0; id < count; ++id) {
-        const CollapseRecord& r = recorder_.records()[order_[id]];
+    for (size_t i = 0; i < count; ++i) {
+        const OperationId id = id_[i];
+        const CollapseRecord& r = recorder_.records()[order_[i]];
         CHECK_EQ(active.record[slot_of_[r.v]].next, id);
         if (r.u == kNoVertex) {
             encodeDummy(active, id, r);
@@ -205,6 +237,7 @@ void Encoder::setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& fro
     o.shift = q.shift;
     o.delta = q.delta;
     for (const int end : {0, 1}) {
+        if (r.child[size_t(end)] != kNoOperation) continue;  // which puts it right
         const Vec3i rest = glm::abs(o.offset(end) - offset[size_t(end)]);
         const uint32_t largest = uint32_t(std::max({rest.x, rest.y, rest.z}));
         counts_.inexact_ends += largest != 0;
@@ -216,6 +249,7 @@ void Encoder::setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& fro
 void Encoder::saturate() {
     for (size_t i = mesh_.operation.size(); i-- > 0;) {
         Operation& o = mesh_.operation[i];
+        if (o.error == 0) continue;
         uint32_t radius = decodeRadius(o.radius);
         for (const int end : {0, 1}) {
             if (o.childOf(end) == kNoOperation) continue;
@@ -250,7 +284,8 @@ ProgressiveMesh buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
     c.refused = recorder.refused();
     c.levels = recorder.largestHeight();
     c.dummies = recorder.dummies();
-    Encoder(recorder, base, lattice, mesh.vertexCount(), result, c).run();
+    c.row = Encoder(recorder, base, lattice, mesh.vertexCount(), result, c).run();
+    c.operations = recorder.records().size();
     return result;
 }
 

@@ -8,7 +8,7 @@
 // has less. Time: about two microseconds a triangle on one core.
 
 #include "base/budget.h"
-#include "methods/pmesh/operations.h"
+#include "methods/pmesh/operation_node.h"
 #include "methods/pmesh/recorder.h"
 
 namespace pietra::pmesh {
@@ -19,9 +19,11 @@ struct BuildCounts {
     uint64_t irregular_vertices = 0;  ///< locked: ends of non-manifold edges, bow-ties
     Recorder::Refused refused;
     uint32_t levels = 0;
+    uint64_t operations = 0;
     uint64_t dummies = 0;
-    uint64_t inexact_ends = 0;  ///< vertices that the offsets do not give exactly, when they appear
+    uint64_t inexact_ends = 0;      ///< vertices that no operation brings exactly to their places
     uint32_t largest_error = 0;     ///< of these, in steps along an axis
+    std::vector<NodeRow> row;       ///< for toNodes()
     std::vector<uint32_t> name_of;  ///< one an input vertex, kNoVertex for those without triangles
 };
 

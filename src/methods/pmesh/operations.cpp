@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 namespace pietra::pmesh {
-namespace {
 
-/// What an operation must not exceed: the criteria of the one above it.
 bool criteriaNest(const Operation& parent, const Operation& child, int end) {
     if (child.error > parent.error) return false;
     const Vec3l d(parent.offset(end));
@@ -17,13 +15,22 @@ std::string faultOf(const Operation& o) {
     if (o.level > kMaxLevel)
         return fmt::format("its level is {}, the largest is {}", o.level, kMaxLevel);
     if (o.radius > kMaxRadiusCode) return fmt::format("its radius has the code {}", o.radius);
-    if (o.error == 0) return "its error has the code 0";
-    if (o.shift > 20) return fmt::format("its deltas are shifted by {}", o.shift);
+    if (o.shift > (o.isDummy() ? 0 : 20))
+        return fmt::format("its deltas are shifted by {}", o.shift);
     if (o.rankLeft() == o.rankRight() && !o.isDummy()) return "its neighbours have equal ranks";
     return "";
 }
 
-}  // namespace
+std::vector<OperationId> coarseToFine(const ProgressiveMesh& mesh) {
+    std::array<uint32_t, kMaxLevel + 2> begin{};
+    for (const Operation& o : mesh.operation)
+        if (o.error != 0) ++begin[o.level + 1u];
+    for (size_t level = 1; level < begin.size(); ++level) begin[level] += begin[level - 1];
+    std::vector<OperationId> order(begin.back());
+    for (OperationId id = 0; id < mesh.operation.size(); ++id)
+        if (mesh.operation[id].error != 0) order[begin[mesh.operation[id].level]++] = id;
+    return order;
+}
 
 std::string validate(const ProgressiveMesh& mesh) {
     const size_t count = mesh.operation.size();
@@ -42,6 +49,10 @@ std::string validate(const ProgressiveMesh& mesh) {
     }
     for (size_t o = 0; o < count; ++o) {
         const Operation& op = mesh.operation[o];
+        if (op.error == 0) {
+            if (has_parent[o]) return fmt::format("operation {}: its error has the code 0", o);
+            continue;
+        }
         if (const std::string fault = faultOf(op); !fault.empty())
             return fmt::format("operation {}: {}", o, fault);
         for (const int end : {0, 1}) {
@@ -58,7 +69,8 @@ std::string validate(const ProgressiveMesh& mesh) {
         }
     }
     for (size_t o = 0; o < count; ++o)
-        if (!has_parent[o]) return fmt::format("operation {}: no parent", o);
+        if (mesh.operation[o].error != 0 && !has_parent[o])
+            return fmt::format("operation {}: no parent", o);
     return "";
 }
 

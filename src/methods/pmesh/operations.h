@@ -99,7 +99,7 @@ struct Operation {
     std::array<OperationId, 2> child;
     uint16_t level;   ///< at most kMaxLevel, below the children's
     uint16_t radius;  ///< of the saturated sphere around the unsplit vertex
-    uint8_t error;    ///< saturated; 0 would mean that there is no operation
+    uint8_t error;    ///< saturated; 0: there is no operation
     uint8_t ranks;    ///< of vl in the lower, of vr in the upper four bits
     uint8_t shift;    ///< of the deltas
     std::array<std::array<int8_t, 3>, 2> delta;  ///< from the unsplit vertex to v, to u: << shift
@@ -123,6 +123,7 @@ struct Operation {
         const auto wide = [&](size_t k) { return delta[0][k] * 256 + uint8_t(delta[1][k]); };
         return Vec3i(wide(0), wide(1), wide(2)) * (1 << shift);
     }
+    bool operator==(const Operation&) const = default;
 };
 static_assert(sizeof(Operation) == 28);
 
@@ -140,10 +141,21 @@ struct ProgressiveMesh {
     std::vector<Vertex> base_vertex;
     std::vector<Triangle> base_triangle;
     std::vector<OperationId> base_operation;  ///< the first split of each base vertex, or none
-    std::vector<Operation> operation;         ///< parents before children
+    /// Parents before children; nodes (operation_node.h) have gaps between them, without
+    /// operations.
+    std::vector<Operation> operation;
 
     uint32_t nameOf(OperationId o) const { return uint32_t(base_vertex.size()) + o; }
 };
+
+/// The operations that there are, by level and id: in this order, each finds the star it was
+/// encoded for.
+std::vector<OperationId> coarseToFine(const ProgressiveMesh& mesh);
+
+/// Empty if levels, ranks and the like are within their ranges, children apart.
+[[nodiscard]] std::string faultOf(const Operation& o);
+/// The child at this end does not exceed the criteria of the one above it.
+[[nodiscard]] bool criteriaNest(const Operation& parent, const Operation& child, int end);
 
 /// Empty if the forest keeps its rules: each operation has one parent, before it, of a lower level
 /// and no smaller criteria; levels, ranks and the base mesh's indices are within their ranges. Else

@@ -58,6 +58,9 @@ WholeMesh readWholeMesh(TriangleSource& source, const std::string& input_name,
         vertices.setShift(chooseShift(source, vertices, kBatchTriangles, progress));
     WholeMesh whole;
     whole.lattice = vertices.lattice();
+    whole.bounds = vertices.bounds();
+    whole.quantisation_error = vertices.quantisationError();
+    whole.input_vertices = vertices.size();
     Mesh& mesh = whole.mesh;
     KeyMap map;
     TriangleAhead ahead(source, kBatchTriangles);

@@ -5,6 +5,7 @@
 
 #include "base/progress.h"
 #include "extmem/spill.h"
+#include "geometry/bounds.h"
 #include "geometry/lattice.h"
 #include "geometry/mesh.h"
 #include "io/triangle_source.h"
@@ -14,6 +15,9 @@ namespace pietra::pmesh {
 struct WholeMesh {
     Mesh mesh;  ///< welded; no degenerate or doubled triangles; normals by area; no edge classes
     Lattice lattice;
+    Box3i bounds;                  ///< of all vertices, used or not, lattice units
+    float quantisation_error = 0;  ///< of the lattice, lattice units
+    uint64_t input_vertices = 0;
     uint64_t dropped_degenerate = 0, dropped_duplicate = 0;
 };
 

@@ -1,0 +1,290 @@
+#include "methods/pmesh/operation_node.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/check.h"
+
+namespace pietra::pmesh {
+namespace {
+
+/// Integer, rounded up.
+uint32_t distance(const Vec3i& a, const Vec3i& b) {
+    const Vec3d d(a - b);
+    return uint32_t(std::ceil(std::sqrt(glm::dot(d, d))));
+}
+
+ChildCode codeOf(OperationId child, NodeIndex node, const NodeRow& row, bool is_before) {
+    if (child == kNoOperation) return kNoChildCode;
+    const NodeIndex of = nodeOf(child);
+    if (of == node) return slotIn(child);
+    if (of == (is_before ? row.parent : row.child[0])) return kNodeSlots + slotIn(child);
+    CHECK_EQ(of, row.child[1]);
+    return 2 * kNodeSlots + slotIn(child);
+}
+
+NodeOperation toNodeOperation(const Operation& o, NodeIndex node, const NodeRow& row) {
+    NodeOperation n;
+    n.structure = StructureWord::of(codeOf(o.child[0], node, row, false),
+                                    codeOf(o.child[1], node, row, o.isDummy()), o.level);
+    n.radius = o.radius;
+    n.error = o.error;
+    n.ranks = o.ranks;
+    n.delta = o.delta;
+    n.normal = o.normal;
+    n.shift = o.shift;
+    return n;
+}
+
+/// Where the vertex lies that each operation splits.
+std::vector<Vec3i> centresOf(const ProgressiveMesh& mesh) {
+    std::vector<Vec3i> centre(mesh.operation.size());
+    for (size_t v = 0; v < mesh.base_vertex.size(); ++v)
+        if (mesh.base_operation[v] != kNoOperation)
+            centre[mesh.base_operation[v]] = mesh.base_vertex[v].position();
+    for (OperationId id = 0; id < mesh.operation.size(); ++id) {
+        const Operation& o = mesh.operation[id];
+        for (const int end : {0, 1})
+            if (o.error != 0 && o.childOf(end) != kNoOperation)
+                centre[o.childOf(end)] = centre[id] + o.offset(end);
+    }
+    return centre;
+}
+
+/// From the last node up: the sphere around those of the operations referred to from above, which
+/// enclose all below, and around the children's, whose rounding may stick out.
+void boundRows(const ProgressiveMesh& mesh, NodeForest& forest) {
+    const std::vector<Vec3i> centre = centresOf(mesh);
+    for (NodeIndex n = NodeIndex(forest.row.size()); n-- > 0;) {
+        NodeRow& row = forest.row[n];
+        const std::span<const NodeOperation> above(forest.node[n].operation.data(),
+                                                   forest.node[n].frontier);
+        Box3i box;
+        for (uint32_t s = 0; s < above.size(); ++s) box.add(centre[operationId(n, s)]);
+        row.centre = box.empty() ? Vec3i(0) : (box.min + box.max) >> 1;
+        uint32_t radius = 0;
+        row.error = 0;
+        const auto enclose = [&](const Vec3i& c, uint32_t radius_code, uint8_t error) {
+            radius = std::max(radius, distance(c, row.centre) + decodeRadius(radius_code));
+            row.error = std::max(row.error, error);
+        };
+        for (uint32_t s = 0; s < above.size(); ++s)
+            enclose(centre[operationId(n, s)], above[s].radius, above[s].error);
+        for (const NodeIndex c : row.child)
+            if (c != kNoNode)
+                enclose(forest.row[c].centre, forest.row[c].radius, forest.row[c].error);
+        row.radius = uint16_t(encodeRoundedUp<11>(radius));
+    }
+}
+
+}  // namespace
+
+Operation toOperation(NodeIndex node, const NodeRow& row, const NodeOperation& n) {
+    Operation o;
+    o.child = {childId(node, row, n, 0), childId(node, row, n, 1)};
+    o.level = uint16_t(n.structure.level());
+    o.radius = n.radius;
+    o.error = n.error;
+    o.ranks = n.ranks;
+    o.shift = n.shift;
+    o.delta = n.delta;
+    o.normal = n.normal;
+    return o;
+}
+
+Node tableNode(NodeIndex index, const NodeRow& row, const OperationNode& node, int lattice_shift) {
+    const auto step = float(1 << lattice_shift);
+    Node n;
+    n.saturated = {Vec3f(row.centre) * step, float(decodeRadius(row.radius)) * step};
+    n.bounds = n.saturated;
+    n.error = float(decodeError(row.error)) * float(kErrorUnit) * step;
+    n.child[0] = row.child[0];
+    n.child[1] = row.child[1];
+    n.group = index;
+    n.level = row.level;
+    n.vertices = uint32_t(node.operation.size());
+    for (const NodeOperation& o : node.operation)
+        n.triangles += ((o.ranks & 15u) != kNoRank) + ((o.ranks >> 4) != kNoRank);
+    return n;
+}
+
+std::vector<NodeRow> rowsOf(std::span<const Node> table, int lattice_shift) {
+    const float step = float(1 << lattice_shift), most = 1 << 23;
+    // Of a file of unknown origin: anything may stand there.
+    const auto whole = [&](float x, float scale) {
+        const float y = x / (step * scale);
+        return y >= -most && y <= most ? int32_t(y) : 0;
+    };
+    std::vector<NodeRow> rows(table.size());
+    for (NodeIndex i = 0; i < table.size(); ++i) {
+        const Node& n = table[i];
+        NodeRow& row = rows[i];
+        row.child = {n.child[0], n.child[1]};
+        for (const NodeIndex c : row.child)
+            if (c != kNoNode) rows[c].parent = i;
+        row.operations = n.vertices;
+        row.level = n.level;
+        const Vec3f& c = n.saturated.centre;
+        row.centre = {whole(c.x, 1), whole(c.y, 1), whole(c.z, 1)};
+        row.radius =
+            uint16_t(encodeRoundedUp<11>(uint64_t(std::max(whole(n.saturated.radius, 1), 0))));
+        const double units = double(n.error) / (double(step) * kErrorUnit);
+        row.error = units >= double(decodeError(kMaxErrorCode))
+                        ? uint8_t(kMaxErrorCode)
+                        : uint8_t(encodeRoundedUp<3>(units > 0 ? uint64_t(units) : 0));
+    }
+    return rows;
+}
+
+NodeForest toNodes(const ProgressiveMesh& mesh, std::vector<NodeRow> rows) {
+    NodeForest forest{mesh.lattice,        mesh.base_vertex, mesh.base_triangle,
+                      mesh.base_operation, std::move(rows),  {}};
+    forest.node.resize(forest.row.size());
+    for (const OperationId id : mesh.base_operation)
+        if (id != kNoOperation) ++forest.node[nodeOf(id)].frontier;
+    for (NodeIndex n = 0; n < forest.row.size(); ++n) {
+        const NodeRow& row = forest.row[n];
+        OperationNode& node = forest.node[n];
+        for (uint32_t s = 0; s < row.operations; ++s) {
+            const Operation& o = mesh.operation[operationId(n, s)];
+            node.operation.push_back(toNodeOperation(o, n, row));
+            for (const int end : {0, 1}) {
+                const OperationId c = o.childOf(end);
+                if (c == kNoOperation || nodeOf(c) == n) continue;
+                auto& levels = node.reference_level[nodeOf(c) == row.child[0] ? 0 : 1];
+                CHECK_EQ(levels.size(), size_t(slotIn(c)));
+                levels.push_back(mesh.operation[c].level);
+            }
+        }
+        for (const size_t side : {0u, 1u})
+            if (row.child[side] != kNoNode)
+                forest.node[row.child[side]].frontier = uint32_t(node.reference_level[side].size());
+    }
+    boundRows(mesh, forest);
+    return forest;
+}
+
+ProgressiveMesh fromNodes(const NodeForest& forest) {
+    ProgressiveMesh mesh{
+        forest.lattice, forest.base_vertex, forest.base_triangle, forest.base_operation, {}};
+    if (forest.node.empty()) return mesh;
+    Operation none{};
+    none.child = {kNoOperation, kNoOperation};
+    mesh.operation.assign(operationId(NodeIndex(forest.node.size() - 1),
+                                      uint32_t(forest.node.back().operation.size())),
+                          none);
+    for (NodeIndex n = 0; n < forest.node.size(); ++n)
+        for (uint32_t s = 0; s < forest.node[n].operation.size(); ++s)
+            mesh.operation[operationId(n, s)] =
+                toOperation(n, forest.row[n], forest.node[n].operation[s]);
+    return mesh;
+}
+
+namespace {
+
+/// Checks the slots in their order; what each refers to must be the next that is not yet.
+class NodeChecker {
+public:
+    NodeChecker(NodeIndex index, const NodeRow& row, const OperationNode& node)
+        : index_(index), row_(row), node_(node), next_{node.frontier, 0, 0} {}
+
+    std::string fault() {
+        const size_t size = node_.operation.size();
+        if (size != row_.operations || size > kNodeSlots || node_.frontier > size)
+            return fmt::format("it has {} operations", size);
+        for (slot_ = 0; slot_ < size; ++slot_)
+            if (const std::string f = operationFault(); !f.empty())
+                return fmt::format("operation {}: {}", slot_, f);
+        for (const size_t side : {0u, 1u}) {
+            const size_t levels = node_.reference_level[side].size();
+            if (next_[1 + side] != levels || (levels == 0) != (row_.child[side] == kNoNode))
+                return fmt::format("it refers to {} operations of child {}, and has {} levels",
+                                   next_[1 + side], side, levels);
+        }
+        if (next_[0] != size) return "not all operations are referred to";
+        return "";
+    }
+
+private:
+    std::string operationFault() {
+        const NodeOperation& n = node_.operation[slot_];
+        const Operation o = toOperation(index_, row_, n);
+        if (o.error == 0) return "its error has the code 0";
+        if (o.error > row_.error) return "its error exceeds its node's";
+        if (std::string f = pmesh::faultOf(o); !f.empty()) return f;
+        for (const int end : {0, 1}) {
+            if (end == 1 && o.isDummy()) return beforeFault(n.structure.child(1));
+            if (std::string f = childFault(o, n.structure.child(end), end); !f.empty()) return f;
+        }
+        return "";
+    }
+
+    std::string childFault(const Operation& o, ChildCode code, int end) {
+        if (isNoChild(code)) return "";
+        const size_t where = code / kNodeSlots, slot = code % kNodeSlots;
+        if (slot != next_[where]++) return "its children are not the next ones";
+        if (where > 0) {
+            const auto& levels = node_.reference_level[where - 1];
+            if (slot >= levels.size()) return "its child has no level";
+            if (levels[slot] <= o.level || levels[slot] > kMaxLevel)
+                return "its level is not below its child's";
+            return "";
+        }
+        if (slot >= node_.operation.size()) return "its child is not there";
+        const NodeOperation& c = node_.operation[slot];
+        if (c.structure.level() <= o.level) return "its level is not below its child's";
+        if (!criteriaNest(o, toOperation(index_, row_, c), end))
+            return "its child's criteria exceed its own";
+        if (c.isDummy() && c.structure.child(1) != slot_) return "its child does not know it";
+        return "";
+    }
+
+    /// In the own node, childFault() of the one before has looked at it.
+    std::string beforeFault(ChildCode code) const {
+        const bool from_above = slot_ < node_.frontier;
+        const bool fits = !from_above              ? code < slot_
+                          : row_.parent == kNoNode ? isNoChild(code)
+                                                   : code / kNodeSlots == 1;
+        return fits ? "" : "it does not know its parent";
+    }
+
+    NodeIndex index_;
+    const NodeRow& row_;
+    const OperationNode& node_;
+    std::array<size_t, 3> next_;  // slots that nothing refers to yet: own, of the children
+    size_t slot_ = 0;
+};
+
+}  // namespace
+
+std::string faultOf(NodeIndex index, const NodeRow& row, const OperationNode& node) {
+    return NodeChecker(index, row, node).fault();
+}
+
+std::string faultBetween(const NodeRow& parent_row, const OperationNode& parent, NodeIndex child,
+                         const OperationNode& node) {
+    const size_t side = parent_row.child[0] == child ? 0 : 1;
+    const auto& levels = parent.reference_level[side];
+    if (levels.size() != node.frontier)
+        return fmt::format("{} operations are referred to, not {}", levels.size(), node.frontier);
+    for (uint32_t s = 0; s < parent.operation.size(); ++s) {
+        const NodeOperation& o = parent.operation[s];
+        for (const int end : {0, 1}) {
+            const ChildCode code = o.structure.child(end);
+            if ((end == 1 && o.isDummy()) || code / kNodeSlots != 1 + side) continue;
+            const uint32_t slot = code % kNodeSlots;
+            const NodeOperation& c = node.operation[slot];
+            if (c.structure.level() != levels[slot])
+                return fmt::format("operation {}: its level is not the one its parent knows", slot);
+            if (c.isDummy() && c.structure.child(1) != kNodeSlots + s)
+                return fmt::format("operation {}: it does not know its parent", slot);
+            if (!criteriaNest(toOperation(0, parent_row, o), toOperation(0, parent_row, c), end))
+                return fmt::format("operation {}: its criteria exceed its parent's", slot);
+        }
+    }
+    return "";
+}
+
+}  // namespace pietra::pmesh
