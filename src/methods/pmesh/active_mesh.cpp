@@ -61,7 +61,8 @@ void permute(std::vector<T>& elements, const std::vector<uint32_t>& place) {
 
 }  // namespace
 
-ActiveMesh::ActiveMesh(const ProgressiveMesh& mesh) : source_(&mesh) {
+ActiveMesh::ActiveMesh(const ProgressiveMesh& mesh, const References* references)
+    : source_(&mesh), references_(references) {
     HalfEdges edges = findHalfEdges(mesh.base_triangle, mesh.base_vertex.size());
     vertex = mesh.base_vertex;
     pulse.resize(vertex.size());
@@ -99,20 +100,43 @@ void ActiveMesh::resize(size_t vertices, size_t faces) {
 
 void ActiveMesh::setNext(uint32_t v, OperationId next) {
     record[v].next = next;
-    const bool none = next == kNoOperation;
-    pulse[v].next_level = none ? uint16_t(kLeafLevel) : source_->operation[next].level;
-    criteria[v].split_radius = none ? uint16_t(0) : source_->operation[next].radius;
-    criteria[v].split_error = none ? uint8_t(0) : source_->operation[next].error;
+    record[v].provisional = 0;
+    if (next == kNoOperation) {
+        pulse[v].next_level = uint16_t(kLeafLevel);
+        criteria[v].split_radius = criteria[v].split_error = 0;
+    } else if (source_->isLoaded(next)) {
+        pulse[v].next_level = source_->at(next).level;
+        updateCriteria(v);
+    } else {
+        const Reference reference = references_->referenceTo(next);
+        const Vec3d d(vertex[v].position() - reference.centre);
+        const uint32_t radius =
+            decodeRadius(reference.radius) + uint32_t(std::sqrt(glm::dot(d, d))) + 1;
+        pulse[v].next_level = reference.level;
+        criteria[v].split_radius = uint16_t(encodeRoundedUp<11>(radius));
+        criteria[v].split_error = reference.error;
+        record[v].provisional = 1;
+    }
+}
+
+void ActiveMesh::updateCriteria(uint32_t v) {
+    const Operation& o = source_->at(record[v].next);
+    criteria[v].split_radius = o.radius;
+    criteria[v].split_error = o.error;
+    record[v].provisional = 0;
 }
 
 void ActiveMesh::setLast(uint32_t v, OperationId last) {
     record[v].last = last;
-    pulse[v].last_level =
-        last == kNoOperation ? uint16_t(0) : uint16_t(source_->operation[last].level + 1);
-    const bool fresh = canUndo(v);
-    criteria[v].merge_radius =
-        fresh ? radiusAroundU(source_->operation[last]) : VertexCriteria::kEverNeeded;
-    criteria[v].merge_error = fresh ? source_->operation[last].error : uint8_t(0);
+    criteria[v].merge_radius = VertexCriteria::kEverNeeded;
+    criteria[v].merge_error = 0;
+    pulse[v].last_level = 0;
+    if (last == kNoOperation) return;
+    const Operation& o = source_->at(last);
+    pulse[v].last_level = uint16_t(o.level + 1);
+    if (!canUndo(v)) return;
+    criteria[v].merge_radius = radiusAroundU(o);
+    criteria[v].merge_error = o.error;
 }
 
 bool ActiveMesh::orient(Star& star) const {
@@ -156,7 +180,7 @@ void ActiveMesh::changeAround(uint32_t v, const Star& star, const VertexPulse& b
 void ActiveMesh::move(uint32_t v, const Star& star) {
     const VertexPulse before = pulse[v];
     const OperationId id = record[v].next;
-    const Operation& o = source_->operation[id];
+    const Operation& o = source_->at(id);
     vertex[v].moveBy(o.offset(0));
     setLast(v, id);
     setNext(v, o.child[0]);
@@ -166,7 +190,7 @@ void ActiveMesh::move(uint32_t v, const Star& star) {
 void ActiveMesh::moveBack(uint32_t v, const Star& star) {
     const VertexPulse before = pulse[v];
     const OperationId id = record[v].last;
-    const Operation& o = source_->operation[id];
+    const Operation& o = source_->at(id);
     vertex[v].moveBy(-o.offset(0));
     setLast(v, o.child[1]);
     setNext(v, id);
@@ -174,7 +198,7 @@ void ActiveMesh::moveBack(uint32_t v, const Star& star) {
 }
 
 bool ActiveMesh::apply(uint32_t v) {
-    const Operation& o = source_->operation[record[v].next];
+    const Operation& o = source_->at(record[v].next);
     Star star;
     gatherStars({&v, 1}, &star, [](uint32_t) {});
     if (!orient(star)) return false;
@@ -192,7 +216,7 @@ bool ActiveMesh::apply(uint32_t v) {
 std::array<uint32_t, 2> ActiveMesh::split(uint32_t v, const Star& star, uint32_t u,
                                           std::array<uint32_t, 2> faces) {
     const OperationId id = record[v].next;
-    const Operation& o = source_->operation[id];
+    const Operation& o = source_->at(id);
     const bool has_left = o.rankLeft() != kNoRank, has_right = o.rankRight() != kNoRank;
     const uint32_t n = star.count, l = star.placeOf(o.rankLeft()), r = star.placeOf(o.rankRight());
     // A triangle of the star by its place; beyond an open fan's ends there is none.
@@ -276,20 +300,20 @@ void ActiveMesh::changeAround(const Star& star, const VertexPulse& before, Verte
                            int16_t level_b, int16_t level_before) {
         int16_t around_a = weighs(level_b, level_a), around_b = weighs(level_a, level_b);
         for (uint32_t i = 0; i < kRing; ++i) {
-            change[i] = int16_t((weighs(level_a, level[i]) & at_a[i]) +
-                                (weighs(level_b, level[i]) & at_b[i]) -
-                                weighs(level_before, level[i]));
+            change[i] =
+                int16_t((weighs(level_a, level[i]) & at_a[i]) +
+                        (weighs(level_b, level[i]) & at_b[i]) - weighs(level_before, level[i]));
             around_a = int16_t(around_a + (weighs(level[i], level_a) & at_a[i]));
             around_b = int16_t(around_b + (weighs(level[i], level_b) & at_b[i]));
         }
         return std::pair(uint32_t(around_a), uint32_t(around_b));
     };
-    const auto [lower_a, lower_b] =
-        count(lower, next, [](int16_t x, int16_t y) { return int16_t(x < y); },
-              int16_t(a.next_level), int16_t(b.next_level), int16_t(before.next_level));
-    const auto [higher_a, higher_b] =
-        count(higher, last, [](int16_t x, int16_t y) { return int16_t(x > y); },
-              int16_t(a.last_level), int16_t(b.last_level), int16_t(before.last_level));
+    const auto [lower_a, lower_b] = count(
+        lower, next, [](int16_t x, int16_t y) { return int16_t(x < y); }, int16_t(a.next_level),
+        int16_t(b.next_level), int16_t(before.next_level));
+    const auto [higher_a, higher_b] = count(
+        higher, last, [](int16_t x, int16_t y) { return int16_t(x > y); }, int16_t(a.last_level),
+        int16_t(b.last_level), int16_t(before.last_level));
     for (uint32_t i = 0; i < star.neighbours(); ++i)
         addAround(star.neighbour[i], uint32_t(lower[i]) + (uint32_t(higher[i]) << 16));
     a.around = lower_a + (higher_a << 16);
@@ -327,7 +351,7 @@ std::array<uint32_t, 2> ActiveMesh::merge(uint32_t v, const Star& star, uint32_t
     a.corner = open ? firstCorner(stays) : stays;
 
     const OperationId id = record[v].last;
-    vertex[v].moveBy(-source_->operation[id].offset(0));
+    vertex[v].moveBy(-source_->at(id).offset(0));
     vertex[v].normal = record[u].undo_normal;
     setLast(v, record[u].undo_last);
     setNext(v, id);

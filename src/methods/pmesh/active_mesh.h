@@ -26,8 +26,8 @@
 
 namespace pietra::pmesh {
 
-/// A triangle: its corners, the first once more at the end; and for each the corner at the same vertex
-/// in the next triangle counter-clockwise, or kNoCorner.
+/// A triangle: its corners, the first once more at the end; and for each the corner at the same
+/// vertex in the next triangle counter-clockwise, or kNoCorner.
 struct alignas(32) ActiveFace {
     std::array<uint32_t, 4> vertex{};
     std::array<uint32_t, 4> left{};  ///< the fourth is padding
@@ -37,8 +37,8 @@ struct alignas(32) ActiveFace {
 /// What a vertex's neighbours look at.
 struct alignas(16) VertexPulse {
     uint32_t name;
-    /// One of its corners; where the fan is open, the first. Else, after a split and until the next,
-    /// in a triangle with the other end.
+    /// One of its corners; where the fan is open, the first. Else, after a split and until the
+    /// next, in a triangle with the other end.
     uint32_t corner;
     uint16_t next_level;  ///< of the next split, or kLeafLevel
     uint16_t last_level;  ///< 1 + that of the last, or 0; equal only for v and u of one split
@@ -60,10 +60,11 @@ struct alignas(16) VertexPulse {
 
 /// What an operation on a vertex needs.
 struct alignas(16) VertexRecord {
-    OperationId next;            ///< its next split, or kNoOperation
-    OperationId last;            ///< the split it came from last, or kNoOperation
-    OperationId undo_last = 0;   ///< if it is the u of a split: what v had before
-    uint32_t undo_normal = 0;    ///< the same
+    OperationId next;           ///< its next split, or kNoOperation
+    OperationId last;           ///< the split it came from last, or kNoOperation
+    OperationId undo_last = 0;  ///< if it is the u of a split: what v had before
+    uint16_t undo_normal = 0;   ///< the same
+    uint16_t provisional = 0;   ///< its split's criteria are a Reference's
 };
 
 /// The spheres and errors that a scan for work compares (criterion.h): those of the next split,
@@ -84,7 +85,7 @@ struct Star {
     static constexpr uint32_t kRoom = 24;
     uint32_t count = 0;  ///< of corners; 0: more than there is room for
     bool closed = false;
-    uint32_t first = 0;  ///< ranks count from here
+    uint32_t first = 0;                  ///< ranks count from here
     std::array<uint32_t, kRoom> corner;  ///< at the vertex
     std::array<uint32_t, kRoom + 1> neighbour;
     uint32_t neighbours() const { return closed ? count : count + 1; }
@@ -97,8 +98,9 @@ struct Star {
 
 class ActiveMesh {
 public:
-    /// The base mesh. `mesh` must outlive this; validate() must find no fault.
-    explicit ActiveMesh(const ProgressiveMesh& mesh);
+    /// The base mesh. `mesh` must outlive this; validate() must find no fault. `references`: only
+    /// where some of it is not loaded.
+    explicit ActiveMesh(const ProgressiveMesh& mesh, const References* references = nullptr);
 
     std::vector<Vertex> vertex;
     std::vector<VertexPulse> pulse;
@@ -137,14 +139,15 @@ public:
     /// The operation that `u` came from last made it, or is a dummy: it is undone from here.
     bool canUndo(uint32_t u) const {
         const OperationId last = record[u].last;
-        return last != kNoOperation && (isNewEnd(u) || source_->operation[last].isDummy());
+        return last != kNoOperation && (isNewEnd(u) || source_->at(last).isDummy());
     }
 
     /// The other end of the last split of v, or v itself if that one has gone on or there is none.
     uint32_t otherEnd(uint32_t v) const {
         const VertexPulse& p = pulse[v];
         if (p.last_level == 0) return v;
-        for (const uint32_t w : {vertexAt(nextCorner(p.corner)), vertexAt(previousCorner(p.corner))})
+        for (const uint32_t w :
+             {vertexAt(nextCorner(p.corner)), vertexAt(previousCorner(p.corner))})
             if (pulse[w].last_level == p.last_level) return w;
         uint32_t other = v;
         allNeighbours(v, [&](uint32_t w) {
@@ -153,6 +156,10 @@ public:
         });
         return other;
     }
+
+    bool isNextLoaded(uint32_t v) const { return source_->isLoaded(record[v].next); }
+    /// Takes the criteria of the next split of v, which has been loaded since, from itself.
+    void updateCriteria(uint32_t v);
 
     /// Performs the next operation of v alone, and makes room for it. False, and nothing done, if
     /// its ranks do not fit v's star.
@@ -165,7 +172,8 @@ public:
     /// Performs the next split of v, no dummy, whose oriented star is `star`. u and `faces`, one
     /// for each of the operation's ranks, the first ones, are made; room for them must be there.
     /// Returns which neighbours are v's now, and which u's: a bit each, in the star's order.
-    std::array<uint32_t, 2> split(uint32_t v, const Star& star, uint32_t u, std::array<uint32_t, 2> faces);
+    std::array<uint32_t, 2> split(uint32_t v, const Star& star, uint32_t u,
+                                  std::array<uint32_t, 2> faces);
 
     /// Undoes the split that made v and u of one, whose stars are these. Returns the faces that are
     /// free now, kNoCorner for none. u is free too; its name is kNoCorner then.
@@ -206,6 +214,7 @@ private:
                    size_t count);
 
     const ProgressiveMesh* source_;
+    const References* references_;
 };
 
 /// Applies all operations in their order; validate() must find no fault. Empty if each finds the

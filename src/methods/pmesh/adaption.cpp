@@ -40,6 +40,7 @@ PassCounts Adaption::frame(const Criterion& criterion, int most_passes) {
         all.merges += uint32_t(merge_.size());
         ++all.passes;
     }
+    listWaiting();
     tidy();
     since_sort_ += all.operations();
     if (since_sort_ > std::max(kLeastSort, mesh_.vertexCount())) {
@@ -51,7 +52,7 @@ PassCounts Adaption::frame(const Criterion& criterion, int most_passes) {
 
 void Adaption::scan() {
     const size_t count = mesh_.vertexCount();
-    for (VertexSet* set : {&marked_, &fresh_, &may_split_, &released_, &may_merge_}) {
+    for (VertexSet* set : {&marked_, &fresh_, &may_split_, &released_, &may_merge_, &unknown_}) {
         set->clear();
         set->resize(count);
     }
@@ -65,11 +66,30 @@ void Adaption::scan() {
                 split |= uint64_t(criterion_.needsSplit(v, c)) << k;
                 merge |= uint64_t(!criterion_.needsLast(v, c)) << k;
             }
+            if (split != 0) split = withoutProvisional(w, split);
             marked_.insertWord(w, split);
             fresh_.insertWord(w, split);
             may_merge_.insertWord(w, merge);
         }
     });
+}
+
+/// Of vertices 64 w and on: what criteria that are only a reference's need is not needed yet, but
+/// to be loaded.
+uint64_t Adaption::withoutProvisional(size_t w, uint64_t needed) {
+    for (uint64_t bits = needed; bits != 0; bits &= bits - 1) {
+        const uint32_t v = uint32_t(64 * w + size_t(std::countr_zero(bits)));
+        if (!mesh_.record[v].provisional) continue;
+        const bool is_loaded = mesh_.isNextLoaded(v);
+        if (is_loaded) {
+            mesh_.updateCriteria(v);
+        } else {
+            unknown_.insert(v);
+        }
+        if (!is_loaded || !criterion_.needsSplit(mesh_.vertex[v], mesh_.criteria[v]))
+            needed &= ~(bits & (0 - bits));
+    }
+    return needed;
 }
 
 void Adaption::gather(Some vertices, Star* stars) const {
@@ -78,6 +98,10 @@ void Adaption::gather(Some vertices, Star* stars) const {
 
 void Adaption::mark(uint32_t v) {
     if (marked_.insert(v)) fresh_.insert(v);
+}
+
+void Adaption::maySplit(uint32_t v) {
+    if (mesh_.isNextLoaded(v)) may_split_.insert(v);
 }
 
 void Adaption::findSplits() {
@@ -95,7 +119,7 @@ void Adaption::findSplits(Some fresh) {
     for (const uint32_t v : fresh) __builtin_prefetch(&mesh_.pulse[v]);
     for (const uint32_t v : fresh) {
         if (mesh_.pulse[v].lower() == 0) {
-            may_split_.insert(v);
+            maySplit(v);
         } else {
             waiting[count++] = v;
         }
@@ -169,7 +193,7 @@ void Adaption::findMerges() {
 
 /// Whether the operation that made u is.
 bool Adaption::isNeeded(uint32_t u) const {
-    const Operation& o = mesh_.source().operation[mesh_.record[u].last];
+    const Operation& o = mesh_.source().at(mesh_.record[u].last);
     return criterion_.needs(mesh_.vertex[u].position() - o.offset(o.isDummy() ? 0 : 1), o.error,
                             o.radius);
 }
@@ -191,7 +215,7 @@ void Adaption::findMerges(Some candidates, std::span<Merge> merges) {
         __builtin_prefetch(&mesh_.vertex[u]);
     }
     for (const uint32_t u : candidates)
-        __builtin_prefetch(&mesh_.source().operation[mesh_.record[u].last]);
+        __builtin_prefetch(&mesh_.source().at(mesh_.record[u].last));
     for (size_t i = 0; i < candidates.size(); ++i) {
         const uint32_t u = candidates[i];
         merges[i] = {kNoCorner, u, {kNoCorner, kNoCorner}};
@@ -218,7 +242,7 @@ void Adaption::findMerges(Some candidates, std::span<Merge> merges) {
 
 /// What an operation between `id` and those after or before it reads, but for the star.
 void Adaption::prefetch(uint32_t v, OperationId id) const {
-    __builtin_prefetch(&mesh_.source().operation[id]);
+    __builtin_prefetch(&mesh_.source().at(id));
     __builtin_prefetch(&mesh_.vertex[v], 1);
     __builtin_prefetch(&mesh_.criteria[v], 1);
 }
@@ -230,33 +254,40 @@ void Adaption::wakeAround(const Star& star, uint32_t v, uint32_t at) {
     for (; at != 0; at &= at - 1) {
         const uint32_t w = star.neighbour[size_t(std::countr_zero(at))];
         const VertexPulse& p = mesh_.pulse[w];
-        if (p.lower() == 0) may_split_.insert(w);
+        if (p.lower() == 0) maySplit(w);
         force |= mesh_.pulse[v].next_level < p.next_level;
     }
-    if (force || criterion_.needsSplit(mesh_.vertex[v], mesh_.criteria[v])) mark(v);
+    if (force) return mark(v);
+    if (!criterion_.needsSplit(mesh_.vertex[v], mesh_.criteria[v])) return;
+    if (mesh_.record[v].provisional) {
+        unknown_.insert(v);
+    } else {
+        mark(v);
+    }
 }
 
 /// Sets places that are not used to kNoCorner.
 void Adaption::applySplits(std::span<Split> splits) {
-    const std::vector<Operation>& operation = mesh_.source().operation;
+    const ProgressiveMesh& source = mesh_.source();
     std::array<uint32_t, kTogether> vertices;
     std::array<Star, kTogether> stars;
     for (const Split& s : splits) __builtin_prefetch(&mesh_.record[s.v], 1);
     for (size_t i = 0; i < splits.size(); ++i) {
         vertices[i] = splits[i].v;
         prefetch(splits[i].v, mesh_.record[splits[i].v].next);
-        prefetch(splits[i].u, 0);
+        prefetch(splits[i].u, mesh_.record[splits[i].v].next);
         __builtin_prefetch(&mesh_.pulse[splits[i].u], 1);
         __builtin_prefetch(&mesh_.record[splits[i].u], 1);
         for (const uint32_t f : splits[i].face) __builtin_prefetch(&mesh_.face[f], 1);
     }
     gather({vertices.data(), splits.size()}, stars.data());
     for (const Split& s : splits)
-        for (const OperationId child : operation[mesh_.record[s.v].next].child)
-            if (child != kNoOperation) __builtin_prefetch(&operation[child]);
+        for (const OperationId child : source.at(mesh_.record[s.v].next).child)
+            if (child != kNoOperation && source.isLoaded(child))
+                __builtin_prefetch(&source.at(child));
     for (size_t i = 0; i < splits.size(); ++i) {
         Split& s = splits[i];
-        const Operation& o = operation[mesh_.record[s.v].next];
+        const Operation& o = source.at(mesh_.record[s.v].next);
         marked_.erase(s.v);
         uint32_t marked = 0;
         for (uint32_t j = 0; j < stars[i].neighbours(); ++j)
@@ -290,7 +321,7 @@ void Adaption::applyMerges(std::span<Merge> merges) {
     gather({vertices.data() + count, count}, stars.data() + count);
     for (const Merge& m : merges) {
         const OperationId before = mesh_.record[m.u].undo_last;
-        if (before != kNoOperation) __builtin_prefetch(&mesh_.source().operation[before]);
+        if (before != kNoOperation) __builtin_prefetch(&mesh_.source().at(before));
     }
     for (size_t i = 0; i < count; ++i) {
         Merge& m = merges[i];
@@ -318,7 +349,7 @@ void Adaption::apply() {
     };
     mesh_.resize(mesh_.vertexCount() + beyond(splits, free_vertex_),
                  mesh_.faceCount() + beyond(2 * splits, free_face_));
-    for (VertexSet* set : {&marked_, &fresh_, &may_split_, &released_, &may_merge_})
+    for (VertexSet* set : {&marked_, &fresh_, &may_split_, &released_, &may_merge_, &unknown_})
         set->resize(mesh_.vertexCount());
     const std::vector<Split> places = split_;
     forSome(split_, [&](std::span<Split> some, size_t) { applySplits(some); });
@@ -338,6 +369,19 @@ void Adaption::apply() {
         for (const uint32_t f : m.face)
             if (f != kNoCorner) free_face_.push_back(f);
     }
+}
+
+void Adaption::listWaiting() {
+    waiting_.clear();
+    const auto list = [&](uint32_t v) {
+        waiting_.push_back(
+            {mesh_.record[v].next, criterion_.needsSplit(mesh_.vertex[v], mesh_.criteria[v])});
+    };
+    marked_.take(list_);
+    for (const uint32_t v : list_) list(v);
+    unknown_.take(list_);
+    for (const uint32_t v : list_)  // since then it may have split or gone
+        if (mesh_.record[v].provisional && mesh_.pulse[v].name != kNoCorner) list(v);
 }
 
 /// No place is left free.

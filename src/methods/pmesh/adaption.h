@@ -2,8 +2,8 @@
 // Parallel adaption (Derzapf et al. 2011, section 4.2): passes over the active mesh, each of which
 // applies all operations that may be applied at once.
 //
-// A frame looks at all vertices once, for what the criterion needs and for what it does not need any
-// more. A pass, from the state before it:
+// A frame looks at all vertices once, for what the criterion needs and for what it does not need
+// any more. A pass, from the state before it:
 //   1. A marked vertex with a neighbour of a lower level must wait: mark that neighbour. So on, in
 //      rounds over those newly marked, until there are none. A marked one without may split.
 //   2. An operation that is not needed may be undone if it is the last of both its vertices, and no
@@ -12,11 +12,15 @@
 //   3. All splits and merges are done, new elements in free places, in the order of the vertices.
 // Each vertex counts the neighbours that it must wait for (VertexPulse::around); when none is left,
 // it is looked at in the next pass. So passes go on from what the last one changed.
-// At a frame's end the last elements move into the places that merges left; after as many operations
-// as there are vertices, all are sorted in space.
+// At a frame's end the last elements move into the places that merges left; after as many
+// operations as there are vertices, all are sorted in space.
 //
 // The set of operations applied when nothing is left to do is the least one that holds all that is
 // needed and is closed under dependency: it depends on the criterion alone, not on what was before.
+//
+// Where some nodes of operations are not loaded, what they would split stays marked, and so nothing
+// around it merges; all of that is told (waiting()). To undo never takes
+// a node that is not loaded, as long as nodes with applied operations stay.
 //
 // The arrays after each pass are the same for any number of threads. A frame with nothing to do
 // reads 24 bytes a vertex. Not thread-safe.
@@ -40,7 +44,8 @@ struct PassCounts {
 class Adaption {
 public:
     /// `mesh` must outlive this; validate() must find no fault in it.
-    explicit Adaption(const ProgressiveMesh& mesh) : mesh_(mesh) {}
+    explicit Adaption(const ProgressiveMesh& mesh, const References* references = nullptr)
+        : mesh_(mesh, references) {}
 
     /// A frame of at most so many passes; ends with the first that finds nothing to do.
     PassCounts frame(const Criterion& criterion, int most_passes);
@@ -49,6 +54,13 @@ public:
     PassCounts settle(const Criterion& criterion) { return frame(criterion, 1 << 30); }
 
     const ActiveMesh& mesh() const { return mesh_; }
+
+    /// An operation that is marked at the end of the last frame, or that is to be known.
+    struct Waiting {
+        OperationId operation;
+        bool is_needed;  ///< or only before one that is
+    };
+    std::span<const Waiting> waiting() const { return waiting_; }
 
 private:
     struct Split {
@@ -64,6 +76,8 @@ private:
 
     bool isNeeded(uint32_t u) const;
     void scan();
+    uint64_t withoutProvisional(size_t w, uint64_t needed);
+    void maySplit(uint32_t v);
     void findSplits();
     void findSplits(Some fresh);
     void placeSplits();
@@ -79,17 +93,20 @@ private:
     void wakeAround(const Star& star, uint32_t v, uint32_t at);
     void applyMerges(std::span<Merge> merges);
     void apply();
+    void listWaiting();
     void tidy();
 
     ActiveMesh mesh_;
     Criterion criterion_;
-    VertexSet marked_;     ///< needed, or needed by a neighbour
-    VertexSet fresh_;      ///< marked, not looked at yet
+    VertexSet marked_;  ///< needed, or needed by a neighbour
+    VertexSet fresh_;   ///< marked, not looked at yet
     VertexSet may_split_;
     VertexSet released_;   ///< no neighbour's last level is higher any more
+    VertexSet unknown_;    ///< unmarked, but what is known of the next split would be needed
     VertexSet may_merge_;  ///< the last operation, which made them, is not needed
     bool none_marked_ = false;
     std::vector<uint32_t> list_;
+    std::vector<Waiting> waiting_;
     std::vector<Split> split_;
     std::vector<Merge> merge_;
     std::vector<uint32_t> free_vertex_, free_face_;

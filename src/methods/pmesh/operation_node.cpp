@@ -168,7 +168,7 @@ NodeForest toNodes(const ProgressiveMesh& mesh, std::vector<NodeRow> rows) {
 
 ProgressiveMesh fromNodes(const NodeForest& forest) {
     ProgressiveMesh mesh{
-        forest.lattice, forest.base_vertex, forest.base_triangle, forest.base_operation, {}};
+        forest.lattice, forest.base_vertex, forest.base_triangle, forest.base_operation, {}, {}};
     if (forest.node.empty()) return mesh;
     Operation none{};
     none.child = {kNoOperation, kNoOperation};

@@ -190,26 +190,35 @@ inline void expectSound(const ActiveMesh& mesh) {
     for (uint32_t v = 0; v < mesh.vertexCount(); ++v) {
         const VertexRecord& r = mesh.record[v];
         const OperationId none = kNoOperation;
-        EXPECT_EQ(mesh.pulse[v].next_level,
-                  r.next == none ? kLeafLevel : mesh.source().operation[r.next].level);
+        if (r.next == none || mesh.isNextLoaded(v)) {
+            EXPECT_EQ(mesh.pulse[v].next_level,
+                      r.next == none ? kLeafLevel : mesh.source().at(r.next).level);
+        }
         EXPECT_EQ(mesh.pulse[v].last_level,
-                  r.last == none ? 0u : mesh.source().operation[r.last].level + 1u);
+                  r.last == none ? 0u : mesh.source().at(r.last).level + 1u);
         if (r.next == none && r.last == none) continue;  // may be irregular
         ASSERT_NE(mesh.pulse[v].corner, kNoCorner);
         EXPECT_EQ(mesh.vertexAt(mesh.pulse[v].corner), v);
         uint32_t reached = 0;
         bool closed = false;
-        for (uint32_t c = mesh.pulse[v].corner; c != kNoCorner && !closed; closed = c == mesh.pulse[v].corner) {
+        for (uint32_t c = mesh.pulse[v].corner; c != kNoCorner && !closed;
+             closed = c == mesh.pulse[v].corner) {
             ++reached;
             c = mesh.leftOf(c);
         }
         EXPECT_EQ(reached, corners[v]);
-        EXPECT_TRUE(closed || mesh.twinOf(mesh.pulse[v].corner) == kNoCorner) << "not the first corner";
+        EXPECT_TRUE(closed || mesh.twinOf(mesh.pulse[v].corner) == kNoCorner)
+            << "not the first corner";
+        uint32_t lower = 0, higher = 0;
         mesh.allNeighbours(v, [&](uint32_t w) {
+            lower += mesh.pulse[w].next_level < mesh.pulse[v].next_level;
+            higher += mesh.pulse[w].last_level > mesh.pulse[v].last_level;
             const uint16_t level = mesh.pulse[w].next_level;
             EXPECT_TRUE(level != mesh.pulse[v].next_level || level == kLeafLevel) << "equal levels";
             return true;
         });
+        EXPECT_EQ(mesh.pulse[v].lower(), lower);
+        EXPECT_EQ(mesh.pulse[v].higher(), higher);
     }
 }
 

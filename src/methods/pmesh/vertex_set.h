@@ -63,9 +63,7 @@ public:
 private:
     static constexpr auto kOrder = std::memory_order_relaxed;
     static uint64_t bitOf(uint32_t v) { return uint64_t(1) << (v % 64); }
-    void use(size_t w) {
-        std::atomic_ref(used_[w / 64]).fetch_or(uint64_t(1) << (w % 64), kOrder);
-    }
+    void use(size_t w) { std::atomic_ref(used_[w / 64]).fetch_or(uint64_t(1) << (w % 64), kOrder); }
 
     std::vector<uint64_t> word_, used_;
 };
