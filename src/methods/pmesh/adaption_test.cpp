@@ -118,6 +118,65 @@ TEST_P(Adapted, AHundredCyclesLeaveTheBaseBitForBit) {
     EXPECT_EQ(adaption.mesh().face, base.face);
 }
 
+TEST(Criterion, NeedsNoSphereWithinOneThatItDoesNotNeed) {
+    const Mesh mesh = onLattice(test::sphereShape(8), 1 << 14);
+    std::mt19937 random(16);
+    const auto below = [&](uint32_t limit) { return int32_t(random() % limit); };
+    uint32_t inner_needed = 0, outer_only = 0;
+    for (int i = 0; i < 400; ++i) {
+        const Criterion view = randomView(random, mesh);
+        for (int j = 0; j < 500; ++j) {
+            const Vec3i centre(below(1 << 14), below(1 << 14), below(1 << 14));
+            const int32_t radius = below(200), range = 1 + below(500);
+            const Vec3i offset(below(2 * range) - range, below(2 * range) - range,
+                               below(2 * range) - range);
+            const uint32_t inner = encodeRoundedUp<11>(uint64_t(radius));
+            const double reach = glm::length(Vec3d(offset)) + decodeRadius(inner);
+            const uint32_t outer = encodeRoundedUp<11>(uint64_t(std::ceil(reach)));
+            const auto error = uint32_t(1 + below(255)),
+                       more = error + uint32_t(below(256 - error));
+            const bool is_needed = view.needs(centre + offset, error, inner);
+            const bool is_outer_needed = view.needs(centre, more, outer);
+            EXPECT_TRUE(is_outer_needed || !is_needed);
+            inner_needed += is_needed;
+            outer_only += is_outer_needed && !is_needed;
+        }
+    }
+    EXPECT_GT(inner_needed, 1000u);
+    EXPECT_GT(outer_only, 1000u);
+}
+
+TEST(Criterion, OfAPictureIsTheSameWithinItAndNeedsLessOutside) {
+    const Lattice lattice;
+    Camera camera;
+    camera.eye = {0, 0, 0};
+    camera.target = {100000, 0, 0};
+    const View view(camera, {1000, 1000}, lattice);
+    const Criterion criterion = criterionOf(view, lattice, 1);
+    Criterion all = criterion;
+    all.side = {};
+    const auto reachOf = [](const Criterion& c, const Vec3d& direction) {
+        int32_t far = 0;
+        for (int32_t step = 1 << 20; step > 0; step /= 2)
+            if (c.needs(Vec3i(direction * double(far + step)), 100, 10)) far += step;
+        return far;
+    };
+    const double edge = std::tan(22.5 / 180 * 3.14159265358979);
+    for (const double y : {-1.0, -0.7, 0.0, 0.7, 1.0})
+        for (const double z : {-1.0, 0.4, 1.0}) {
+            const Vec3d inside(1, 0.99 * edge * y, 0.99 * edge * z);
+            EXPECT_EQ(reachOf(criterion, inside), reachOf(all, inside));
+        }
+    int32_t before = reachOf(all, {1, 0, 0});
+    for (const double y : {1.5, 3.0, 100.0}) {
+        const int32_t outside = reachOf(criterion, glm::normalize(Vec3d(1, edge * y, 0)));
+        EXPECT_LT(outside, before);
+        EXPECT_GT(outside, 0);
+        before = outside;
+    }
+    EXPECT_LT(reachOf(criterion, {-1, 0, 0}), reachOf(all, {-1, 0, 0}) / 4);
+}
+
 uint64_t hashOf(const ActiveMesh& mesh) {
     uint64_t hash = mesh.vertexCount();
     const auto add = [&](const auto& array) {

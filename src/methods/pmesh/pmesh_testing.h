@@ -99,6 +99,16 @@ inline Criterion randomView(std::mt19937& random, const Mesh& mesh) {
     const double scale = std::exp2(power(random)) * kErrorUnit * 32;
     for (uint32_t code = 1; code < 256; ++code)
         criterion.reach[code] = int32_t(std::min(double(decodeError(code)) * scale, 0x1p25));
+    if (random() % 2 == 0) return criterion;
+    // A pyramid, towards somewhere in the model.
+    std::normal_distribution<double> any;
+    const Vec3d target(mesh.position[random() % mesh.position.size()]);
+    const Vec3d forward = glm::normalize(target - Vec3d(criterion.eye) + 0.5);
+    for (Vec3i& side : criterion.side) {
+        const Vec3d n =
+            glm::normalize(forward + 2.0 * Vec3d(any(random), any(random), any(random)));
+        side = Vec3i(n * double((1 << Criterion::kSideBits) - 1));
+    }
     return criterion;
 }
 
