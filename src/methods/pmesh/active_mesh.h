@@ -72,9 +72,11 @@ struct alignas(16) VertexRecord {
 /// one around u, which tells in haste that nothing is to do.
 struct VertexCriteria {
     uint16_t split_radius = 0;
-    uint16_t merge_radius = kEverNeeded;
     uint8_t split_error = 0;
+    uint8_t unused = 0;
+    uint16_t merge_radius = kEverNeeded;
     uint8_t merge_error = 0;
+    uint8_t unused_too = 0;
     static constexpr uint16_t kEverNeeded = 0x7fff;  ///< beyond all distances
     /// Added to merge_radius: a neighbour hinders the merge, whatever the view.
     static constexpr uint16_t kBlocked = 0x8000;

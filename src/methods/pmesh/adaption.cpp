@@ -5,6 +5,7 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "methods/pmesh/criterion_scan.h"
 
 namespace pietra::pmesh {
 namespace {
@@ -58,14 +59,10 @@ void Adaption::scan() {
     }
     parallelForSlices(marked_.words(), 64, [&](size_t begin, size_t end) {
         for (size_t w = begin; w < end; ++w) {
-            uint64_t split = 0, merge = 0;
-            const size_t first = 64 * w, some = std::min<size_t>(64, count - first);
-            for (size_t k = 0; k < some; ++k) {
-                const Vertex& v = mesh_.vertex[first + k];
-                const VertexCriteria& c = mesh_.criteria[first + k];
-                split |= uint64_t(criterion_.needsSplit(v, c)) << k;
-                merge |= uint64_t(!criterion_.needsLast(v, c)) << k;
-            }
+            const size_t first = 64 * w;
+            auto [split, merge] =
+                scanVertices(criterion_, &mesh_.vertex[first], &mesh_.criteria[first],
+                             std::min<size_t>(64, count - first));
             if (split != 0) split = withoutProvisional(w, split);
             marked_.insertWord(w, split);
             fresh_.insertWord(w, split);

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "base/parallel.h"
+#include "methods/pmesh/criterion_scan.h"
 #include "methods/pmesh/pmesh_testing.h"
 #include "methods/pmesh/whole_mesh.h"
 
@@ -144,6 +145,45 @@ TEST(Criterion, NeedsNoSphereWithinOneThatItDoesNotNeed) {
     }
     EXPECT_GT(inner_needed, 1000u);
     EXPECT_GT(outer_only, 1000u);
+}
+
+TEST(Criterion, DecidesTheSameOfManyVerticesAtOnce) {
+    const Mesh mesh = onLattice(test::sphereShape(8), 1 << 12);
+    std::mt19937 random(17);
+    std::vector<Vertex> vertex(64);
+    std::vector<VertexCriteria> criteria(64);
+    uint32_t needed = 0, close = 0;
+    for (int i = 0; i < 2000; ++i) {
+        Criterion view = randomView(random, mesh);
+        for (size_t k = 0; k < 64; ++k) {
+            // Some as close to the limit as may be.
+            const auto error = uint8_t(1 + random() % 255);
+            const int32_t reach = view.reach[error];
+            const Vec3i p =
+                random() % 2 ? mesh.position[random() % mesh.position.size()]
+                             : view.eye + Vec3i(std::min(reach, 1 << 22), int32_t(random() % 3), 0);
+            vertex[k] = {p.x, p.y, p.z, 0};
+            VertexCriteria& c = criteria[k];
+            c.split_radius = uint16_t(random() % (random() % 2 ? 3 : kMaxRadiusCode));
+            c.merge_radius = random() % 4 ? uint16_t(random() % 3000) : VertexCriteria::kEverNeeded;
+            if (random() % 8 == 0) c.merge_radius |= VertexCriteria::kBlocked;
+            c.split_error = error;
+            c.merge_error = uint8_t(random());
+        }
+        const size_t count = 1 + random() % 64;
+        const ScanBits bits = scanVertices(view, vertex.data(), criteria.data(), count);
+        for (size_t k = 0; k < 64; ++k) {
+            const bool is_there = k < count;
+            EXPECT_EQ(bits.split >> k & 1, is_there && view.needsSplit(vertex[k], criteria[k]));
+            EXPECT_EQ(bits.merge >> k & 1, is_there && !view.needsLast(vertex[k], criteria[k]));
+            needed += bits.split >> k & 1;
+            Vertex next = vertex[k];
+            ++next.x;
+            close += view.needsSplit(vertex[k], criteria[k]) != view.needsSplit(next, criteria[k]);
+        }
+    }
+    EXPECT_GT(needed, 1000u);
+    EXPECT_GT(close, 100u);
 }
 
 TEST(Criterion, OfAPictureIsTheSameWithinItAndNeedsLessOutside) {
