@@ -133,16 +133,17 @@ void hover(Adaption& adaption, const Box3d& box, const Lattice& lattice, int job
         adaption.mesh().vertexCount(), double(operations) / 100, ns[50], ns[90]);
 }
 
-/// A camera that rushes to and fro while it circles: each frame until nothing is left to do.
+/// A camera that rushes to and fro while it circles, eight frames a round: each frame until nothing
+/// is left to do.
 void storm(Adaption& adaption, const Box3d& box, const Lattice& lattice, double pixels) {
     const auto view = [&](int frame) {
-        const double t = std::abs(frame % 24 - 12) / 12.0;
-        return viewFrom(box, lattice, 0.02 * frame, 0.4 + 0.8 * t, pixels);
+        const double t = std::abs(frame % 8 - 4) / 4.0;
+        return viewFrom(box, lattice, 0.05 * frame, 0.4 + 1.6 * t, pixels);
     };
     adaption.settle(view(0));
     uint64_t operations = 0, passes = 0, vertices = 0;
     uint32_t least = ~0u;
-    const int frames = 48;
+    const int frames = 24;
     const double begin = now(), wall = wallNow();
     for (int frame = 1; frame <= frames; ++frame) {
         const PassCounts counts = adaption.settle(view(frame));
@@ -182,7 +183,7 @@ void run(const char* path, int jobs) {
     }
     fly(adaption, box, mesh.lattice, jobs);
     hover(adaption, box, mesh.lattice, jobs);
-    for (const double pixels : {1.0, 0.5, 0.25}) storm(adaption, box, mesh.lattice, pixels);
+    for (const double pixels : {0.25, 0.1}) storm(adaption, box, mesh.lattice, pixels);
 }
 
 }  // namespace

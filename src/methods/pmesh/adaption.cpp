@@ -34,7 +34,8 @@ PassCounts Adaption::frame(const Criterion& criterion, int most_passes) {
     PassCounts all;
     for (int pass = 0; pass < most_passes; ++pass) {
         findSplits();
-        findMerges();
+        merge_.clear();
+        if (split_.empty() || pass + 1 == most_passes) findMerges();
         if (split_.empty() && merge_.empty()) break;
         apply();
         all.splits += uint32_t(split_.size());
@@ -44,7 +45,7 @@ PassCounts Adaption::frame(const Criterion& criterion, int most_passes) {
     listWaiting();
     tidy();
     since_sort_ += all.operations();
-    if (since_sort_ > std::max(kLeastSort, mesh_.vertexCount())) {
+    if (since_sort_ > std::max(kLeastSort, 4 * mesh_.vertexCount())) {
         mesh_.sortInSpace();
         since_sort_ = 0;
     }
