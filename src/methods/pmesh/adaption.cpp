@@ -157,12 +157,15 @@ void Adaption::findCandidates() {
         prefetchOtherEnds(some);
         for (uint32_t u : some) {
             if (!mesh_.isNewEnd(u)) u = mesh_.otherEnd(u);
-            if (!mesh_.canUndo(u)) continue;
-            uint16_t& radius = mesh_.criteria[u].merge_radius;
-            radius &= uint16_t(~VertexCriteria::kBlocked);
-            if (!criterion_.needsLast(mesh_.vertex[u], mesh_.criteria[u])) may_merge_.insert(u);
+            if (mesh_.canUndo(u)) may_merge_.insert(u);
         }
     });
+}
+
+void Adaption::setBlocked(uint32_t u, bool blocked) {
+    uint16_t& radius = mesh_.criteria[u].merge_radius;
+    radius =
+        blocked ? radius | VertexCriteria::kBlocked : radius & uint16_t(~VertexCriteria::kBlocked);
 }
 
 void Adaption::prefetchOtherEnds(Some vertices) const {
@@ -191,6 +194,7 @@ void Adaption::findMerges() {
 
 /// Whether the operation that made u is.
 bool Adaption::isNeeded(uint32_t u) const {
+    if (criterion_.needsLast(mesh_.vertex[u], mesh_.criteria[u])) return true;
     const Operation& o = mesh_.source().at(mesh_.record[u].last);
     return criterion_.needs(mesh_.vertex[u].position() - o.offset(o.isDummy() ? 0 : 1), o.error,
                             o.radius);
@@ -204,9 +208,6 @@ void Adaption::findMerges(Some candidates, std::span<Merge> merges) {
     std::array<uint32_t, kTogether> ends;
     std::array<size_t, kTogether> of;
     size_t count = 0;
-    const auto block = [&](uint32_t u) {
-        mesh_.criteria[u].merge_radius |= VertexCriteria::kBlocked;
-    };
     for (const uint32_t u : candidates) {
         __builtin_prefetch(&mesh_.pulse[u]);
         __builtin_prefetch(&mesh_.record[u]);
@@ -217,9 +218,9 @@ void Adaption::findMerges(Some candidates, std::span<Merge> merges) {
     for (size_t i = 0; i < candidates.size(); ++i) {
         const uint32_t u = candidates[i];
         merges[i] = {kNoCorner, u, {kNoCorner, kNoCorner}};
-        if (mesh_.pulse[u].higher() > 0) {
-            block(u);
-        } else if (!marked_.contains(u) && !isNeeded(u)) {
+        const bool blocked = mesh_.pulse[u].higher() > 0;
+        setBlocked(u, blocked);
+        if (!blocked && !marked_.contains(u) && !isNeeded(u)) {
             of[count] = i;
             ends[count++] = u;
         }
@@ -228,7 +229,7 @@ void Adaption::findMerges(Some candidates, std::span<Merge> merges) {
     for (size_t j = 0; j < count; ++j) {
         const uint32_t u = ends[j], v = mesh_.otherEnd(u);
         if (mesh_.pulse[v].higher() > 0) {
-            block(u);
+            setBlocked(u, true);
         } else {
             merges[of[j]].v = v;
         }
@@ -385,6 +386,8 @@ void Adaption::listWaiting() {
 /// No place is left free.
 void Adaption::tidy() {
     findCandidates();
+    may_merge_.take(list_);
+    for (const uint32_t u : list_) setBlocked(u, false);
     if (!free_vertex_.empty() || !free_face_.empty()) mesh_.fillHoles(free_vertex_, free_face_);
     free_vertex_.clear();
     free_face_.clear();

@@ -83,6 +83,7 @@ private:
     void placeSplits();
     void mark(uint32_t v);
     void findCandidates();
+    void setBlocked(uint32_t u, bool blocked);
     void findMerges();
     void findMerges(Some candidates, std::span<Merge> merges);
     void prefetchOtherEnds(Some vertices) const;
