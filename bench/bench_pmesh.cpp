@@ -30,6 +30,12 @@ double now() {
     return double(t.tv_sec) + double(t.tv_nsec) * 1e-9;
 }
 
+double wallNow() {
+    timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return double(t.tv_sec) + double(t.tv_nsec) * 1e-9;
+}
+
 void report(const NodeForest& mesh, const BuildCounts& counts, double seconds) {
     std::printf(
         "  built in %.2f s: base %zu vertices, %zu triangles; %zu operations, %llu dummies;"
@@ -70,14 +76,11 @@ void reportPages(const NodeForest& forest, const BuildCounts& counts) {
 /// Passes to the end; operations a second.
 void settle(const char* what, Adaption& adaption, const Criterion& criterion) {
     const double begin = now();
-    uint64_t operations = 0;
-    int passes = 0;
-    for (PassCounts counts; ++passes, (counts = adaption.pass(criterion)).operations() > 0;)
-        operations += counts.operations();
+    const PassCounts counts = adaption.settle(criterion);
     const double seconds = now() - begin;
-    std::printf("  %s: %llu operations in %d passes, %.1f ms: %.2f M/s; %zu faces\n", what,
-                static_cast<unsigned long long>(operations), passes, seconds * 1e3,
-                double(operations) / seconds * 1e-6, adaption.mesh().faceCount());
+    std::printf("  %s: %u operations in %u passes, %.1f ms: %.2f M/s; %zu faces\n", what,
+                counts.operations(), counts.passes, seconds * 1e3,
+                counts.operations() / seconds * 1e-6, adaption.mesh().faceCount());
 }
 
 Criterion viewFrom(const Box3d& box, const Lattice& lattice, double turn, double distance,
@@ -129,6 +132,34 @@ void hover(Adaption& adaption, const Box3d& box, const Lattice& lattice, int job
         adaption.mesh().vertexCount(), double(operations) / 100, ns[50], ns[90]);
 }
 
+/// A camera that rushes to and fro while it circles, eight frames a round: each frame until nothing
+/// is left to do.
+void storm(Adaption& adaption, const Box3d& box, const Lattice& lattice, double pixels) {
+    const auto view = [&](int frame) {
+        const double t = std::abs(frame % 8 - 4) / 4.0;
+        return viewFrom(box, lattice, 0.05 * frame, 0.4 + 1.6 * t, pixels);
+    };
+    adaption.settle(view(0));
+    uint64_t operations = 0, passes = 0, vertices = 0;
+    uint32_t least = ~0u;
+    const int frames = 24;
+    const double begin = now(), wall = wallNow();
+    for (int frame = 1; frame <= frames; ++frame) {
+        const PassCounts counts = adaption.settle(view(frame));
+        operations += counts.operations();
+        passes += counts.passes;
+        vertices += adaption.mesh().vertexCount();
+        least = std::min(least, counts.operations());
+    }
+    std::printf(
+        "  storm at %.2f px: %llu vertices, %llu operations a frame (at least %u), %.1f passes:"
+        " %.2f M operations/s of processor, %.2f M/s\n",
+        pixels, static_cast<unsigned long long>(vertices / frames),
+        static_cast<unsigned long long>(operations / frames), least, double(passes) / frames,
+        double(operations) / (now() - begin) * 1e-6,
+        double(operations) / (wallNow() - wall) * 1e-6);
+}
+
 void run(const char* path, int jobs) {
     Budget budget(size_t(8) << 30);
     TempSpace space{"/tmp", &budget, size_t(1) << 30};
@@ -152,6 +183,7 @@ void run(const char* path, int jobs) {
     }
     fly(adaption, box, mesh.lattice, jobs);
     hover(adaption, box, mesh.lattice, jobs);
+    for (const double pixels : {0.25, 0.1}) storm(adaption, box, mesh.lattice, pixels);
 }
 
 }  // namespace

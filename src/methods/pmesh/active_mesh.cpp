@@ -1,14 +1,15 @@
 #include "methods/pmesh/active_mesh.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_sort.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numeric>
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "geometry/bounds.h"
 
 namespace pietra::pmesh {
 namespace {
@@ -25,28 +26,27 @@ uint16_t radiusAroundU(const Operation& o) {
     return uint16_t(decodeRadius(code) > rest ? code - 1 : code);
 }
 
-/// Every third bit of the result.
-uint64_t spread(uint32_t x) {
-    uint64_t bits = x & 0x1fffff;
-    bits = (bits | bits << 32) & 0x001f00000000ffff;
-    bits = (bits | bits << 16) & 0x001f0000ff0000ff;
-    bits = (bits | bits << 8) & 0x100f00f00f00f00f;
-    bits = (bits | bits << 4) & 0x10c30c30c30c30c3;
-    return (bits | bits << 2) & 0x1249249249249249;
+/// Six bits of x, every third bit of the result.
+uint32_t spread(uint32_t x) {
+    uint32_t bits = x & 0x3f;
+    bits = (bits | bits << 8) & 0x0300f;
+    bits = (bits | bits << 4) & 0x030c3;
+    return (bits | bits << 2) & 0x09249;
 }
 
-/// Where each of `count` elements goes: those from `first` on by their keys, the others stay.
+/// Where each of `count` elements goes: those from `first` on by their keys, each below `keys`; the
+/// others stay.
 template <class KeyOf>
-std::vector<uint32_t> placesByKey(size_t first, size_t count, KeyOf&& key_of) {
-    std::vector<std::pair<uint64_t, uint32_t>> order(count - first);
-    parallelForSlices(order.size(), 16 * kGrain, [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i)
-            order[i] = {key_of(uint32_t(first + i)), uint32_t(first + i)};
+std::vector<uint32_t> placesByKey(size_t first, size_t count, size_t keys, KeyOf&& key_of) {
+    std::vector<uint32_t> place(count), begin(keys + 1, 0);
+    parallelForSlices(count - first, 16 * kGrain, [&](size_t from, size_t to) {
+        for (size_t i = first + from; i < first + to; ++i) place[i] = key_of(uint32_t(i));
     });
-    tbb::parallel_sort(order.begin(), order.end());
-    std::vector<uint32_t> place(count);
+    for (size_t i = first; i < count; ++i) ++begin[place[i] + 1];
+    begin[0] = uint32_t(first);
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    for (size_t i = first; i < count; ++i) place[i] = begin[place[i]]++;
     std::iota(place.begin(), place.begin() + ptrdiff_t(first), 0u);
-    for (size_t i = 0; i < order.size(); ++i) place[order[i].second] = uint32_t(first + i);
     return place;
 }
 
@@ -61,23 +61,32 @@ void permute(std::vector<T>& elements, const std::vector<uint32_t>& place) {
 
 }  // namespace
 
-ActiveMesh::ActiveMesh(const ProgressiveMesh& mesh) : source_(&mesh) {
+ActiveMesh::ActiveMesh(const ProgressiveMesh& mesh, const References* references)
+    : source_(&mesh), references_(references) {
     HalfEdges edges = findHalfEdges(mesh.base_triangle, mesh.base_vertex.size());
     vertex = mesh.base_vertex;
     pulse.resize(vertex.size());
     record.resize(vertex.size());
     criteria.resize(vertex.size());
     for (uint32_t v = 0; v < vertex.size(); ++v) {
-        record[v].name = v;
-        record[v].corner = edges.corner_of[v];
+        pulse[v].name = v;
+        pulse[v].corner = edges.corner_of[v];
         setLast(v, kNoOperation);
         setNext(v, mesh.base_operation[v]);
     }
     face.resize(mesh.base_triangle.size());
     for (uint32_t f = 0; f < face.size(); ++f)
         for (uint32_t k = 0; k < 3; ++k) {
-            face[f].vertex[k] = mesh.base_triangle[f][k];
-            face[f].twin[k] = edges.twin[3 * f + k];
+            setVertexAt(4 * f + k, mesh.base_triangle[f][k]);
+            setTwin(4 * f + k, edges.twin[3 * f + k]);
+        }
+    for (const ActiveFace& f : face)
+        for (uint32_t k = 0; k < 3; ++k) {
+            // An edge is met once in each direction, but at a border.
+            const uint32_t v = f.vertex[k], w = f.vertex[k + 1];
+            pulse[v].around += pulse[w].weightOn(pulse[v]);
+            const bool border = f.left[(k + 1) % 3] == kNoCorner;
+            if (border) pulse[w].around += pulse[v].weightOn(pulse[w]);
         }
 }
 
@@ -91,32 +100,54 @@ void ActiveMesh::resize(size_t vertices, size_t faces) {
 
 void ActiveMesh::setNext(uint32_t v, OperationId next) {
     record[v].next = next;
-    pulse[v].changed = time;
-    const bool none = next == kNoOperation;
-    pulse[v].next_level = none ? uint16_t(kLeafLevel) : source_->operation[next].level;
-    criteria[v].split_radius = none ? uint16_t(0) : source_->operation[next].radius;
-    criteria[v].split_error = none ? uint8_t(0) : source_->operation[next].error;
+    record[v].provisional = 0;
+    if (next == kNoOperation) {
+        pulse[v].next_level = uint16_t(kLeafLevel);
+        criteria[v].split_radius = criteria[v].split_error = 0;
+    } else if (source_->isLoaded(next)) {
+        pulse[v].next_level = source_->at(next).level;
+        updateCriteria(v);
+    } else {
+        const Reference reference = references_->referenceTo(next);
+        const Vec3d d(vertex[v].position() - reference.centre);
+        const uint32_t radius =
+            decodeRadius(reference.radius) + uint32_t(std::sqrt(glm::dot(d, d))) + 1;
+        pulse[v].next_level = reference.level;
+        criteria[v].split_radius = uint16_t(encodeRoundedUp<11>(radius));
+        criteria[v].split_error = reference.error;
+        record[v].provisional = 1;
+    }
+}
+
+void ActiveMesh::updateCriteria(uint32_t v) {
+    const Operation& o = source_->at(record[v].next);
+    criteria[v].split_radius = o.radius;
+    criteria[v].split_error = o.error;
+    record[v].provisional = 0;
 }
 
 void ActiveMesh::setLast(uint32_t v, OperationId last) {
     record[v].last = last;
-    pulse[v].last_level =
-        last == kNoOperation ? uint16_t(0) : uint16_t(source_->operation[last].level + 1);
-    const bool fresh = canUndo(v);
-    criteria[v].merge_radius =
-        fresh ? radiusAroundU(source_->operation[last]) : VertexCriteria::kEverNeeded;
-    criteria[v].merge_error = fresh ? source_->operation[last].error : uint8_t(0);
+    criteria[v].merge_radius = VertexCriteria::kEverNeeded;
+    criteria[v].merge_error = 0;
+    pulse[v].last_level = 0;
+    if (last == kNoOperation) return;
+    const Operation& o = source_->at(last);
+    pulse[v].last_level = uint16_t(o.level + 1);
+    if (!canUndo(v)) return;
+    criteria[v].merge_radius = radiusAroundU(o);
+    criteria[v].merge_error = o.error;
 }
 
 bool ActiveMesh::orient(Star& star) const {
     if (star.count == 0 || star.neighbours() > kMaxNeighbours) return false;
     if (!star.closed) return true;
-    uint32_t least = 0, least_name = ~0u;
+    uint32_t least_name = ~0u;
     for (uint32_t i = 0; i < star.count; ++i) {
-        const uint32_t name = record[neighbour(star, i)].name;
-        if (name < least_name) least = i, least_name = name;
+        const uint32_t name = pulse[star.neighbour[i]].name;
+        star.first = name < least_name ? i : star.first;
+        least_name = std::min(name, least_name);
     }
-    std::rotate(star.corner.begin(), star.corner.begin() + least, star.corner.begin() + star.count);
     return true;
 }
 
@@ -135,50 +166,66 @@ uint32_t ActiveMesh::firstCorner(uint32_t corner) const {
     }
 }
 
-void ActiveMesh::move(uint32_t v) {
+/// v alone has changed its levels.
+void ActiveMesh::changeAround(uint32_t v, const Star& star, const VertexPulse& before) {
+    const VertexPulse& after = pulse[v];
+    uint32_t around = 0;
+    for (const uint32_t w : star.ring()) {
+        addAround(w, after.weightOn(pulse[w]) - before.weightOn(pulse[w]));
+        around += pulse[w].weightOn(after);
+    }
+    pulse[v].around = around;
+}
+
+void ActiveMesh::move(uint32_t v, const Star& star) {
+    const VertexPulse before = pulse[v];
     const OperationId id = record[v].next;
-    const Operation& o = source_->operation[id];
+    const Operation& o = source_->at(id);
     vertex[v].moveBy(o.offset(0));
     setLast(v, id);
     setNext(v, o.child[0]);
+    changeAround(v, star, before);
 }
 
-void ActiveMesh::moveBack(uint32_t v) {
+void ActiveMesh::moveBack(uint32_t v, const Star& star) {
+    const VertexPulse before = pulse[v];
     const OperationId id = record[v].last;
-    const Operation& o = source_->operation[id];
+    const Operation& o = source_->at(id);
     vertex[v].moveBy(-o.offset(0));
     setLast(v, o.child[1]);
     setNext(v, id);
+    changeAround(v, star, before);
 }
 
 bool ActiveMesh::apply(uint32_t v) {
-    const Operation& o = source_->operation[record[v].next];
-    if (o.isDummy()) return move(v), true;
+    const Operation& o = source_->at(record[v].next);
     Star star;
     gatherStars({&v, 1}, &star, [](uint32_t) {});
     if (!orient(star)) return false;
+    if (o.isDummy()) return move(v, star), true;
     const uint32_t faces = (o.rankLeft() != kNoRank) + (o.rankRight() != kNoRank);
     for (const uint32_t rank : {o.rankLeft(), o.rankRight()})
         if (rank != kNoRank && rank >= star.neighbours()) return false;
     if (star.closed && faces < 2) return false;
     const uint32_t u = uint32_t(vertexCount()), first_face = uint32_t(faceCount());
     resize(u + 1, first_face + faces);
-    split(v, star, u, first_face);
+    split(v, star, u, {first_face, first_face + 1});
     return true;
 }
 
-void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t first_face) {
+std::array<uint32_t, 2> ActiveMesh::split(uint32_t v, const Star& star, uint32_t u,
+                                          std::array<uint32_t, 2> faces) {
     const OperationId id = record[v].next;
-    const Operation& o = source_->operation[id];
-    const uint32_t n = star.count, l = o.rankLeft(), r = o.rankRight();
-    const bool has_left = l != kNoRank, has_right = r != kNoRank;
+    const Operation& o = source_->at(id);
+    const bool has_left = o.rankLeft() != kNoRank, has_right = o.rankRight() != kNoRank;
+    const uint32_t n = star.count, l = star.placeOf(o.rankLeft()), r = star.placeOf(o.rankRight());
     // A triangle of the star by its place; beyond an open fan's ends there is none.
     const auto triangle = [&](uint32_t i) {
         if (i < n) return star.corner[i];
         return star.closed ? star.corner[i == n ? 0 : n - 1] : kNoCorner;
     };
-    const uint32_t vl = has_left ? neighbour(star, l) : 0;
-    const uint32_t vr = has_right ? neighbour(star, r) : 0;
+    const uint32_t vl = has_left ? star.neighbour[l] : 0;
+    const uint32_t vr = has_right ? star.neighbour[r] : 0;
 
     const uint32_t begin = has_right ? r : 0, end = has_left ? l : n;
     for (uint32_t i = begin, left = end >= begin ? end - begin : n - begin + end; left > 0;
@@ -186,10 +233,10 @@ void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t first_
         setVertexAt(star.corner[i], u);
         if (++i == n) i = 0;
     }
-    const uint32_t fl = 4 * first_face, fr = has_left ? fl + 4 : fl;
+    const uint32_t fl = 4 * faces[0], fr = 4 * faces[has_left ? 1 : 0];
     if (has_left) {
         const uint32_t of_u = triangle(l - 1), of_v = triangle(l);
-        face[fl >> 2].vertex = {v, u, vl, 0};
+        face[fl >> 2].vertex = {v, u, vl, v};
         link(fl, has_right ? fr : kNoCorner);
         link(fl + 1, of_u == kNoCorner ? kNoCorner : previousCorner(of_u));
         link(fl + 2, of_v);
@@ -197,21 +244,22 @@ void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t first_
     }
     if (has_right) {
         const uint32_t of_v = triangle(r - 1), of_u = triangle(r);
-        face[fr >> 2].vertex = {u, v, vr, 0};
+        face[fr >> 2].vertex = {u, v, vr, u};
         if (!has_left) link(fr, kNoCorner);
         link(fr + 1, of_v == kNoCorner ? kNoCorner : previousCorner(of_v));
         link(fr + 2, of_u);
         if (of_u == kNoCorner) corner(vr).store(fr + 2, kRelaxed);
     }
-    VertexRecord& a = record[v];
-    VertexRecord& b = record[u];
+    const VertexPulse before = pulse[v];
+    VertexPulse& a = pulse[v];
+    VertexPulse& b = pulse[u];
     a.corner = has_left ? fl : fr + 1;
     b.corner = has_left ? fl + 1 : fr;
     if (!star.closed) a.corner = firstCorner(a.corner), b.corner = firstCorner(b.corner);
 
     b.name = source_->nameOf(id);
-    b.undo_last = a.last;
-    b.undo_normal = uint16_t(vertex[v].normal);
+    record[u].undo_last = record[v].last;
+    record[u].undo_normal = uint16_t(vertex[v].normal);
     vertex[u] = vertex[v];
     vertex[u].moveBy(o.offset(1));
     vertex[u].normal = o.normal[1];
@@ -221,40 +269,112 @@ void ActiveMesh::split(uint32_t v, const Star& star, uint32_t u, uint32_t first_
     setLast(u, id);
     setNext(v, o.child[0]);
     setNext(u, o.child[1]);
+
+    // Counter-clockwise, from vr to vl lie u's neighbours, from vl to vr those of v.
+    const uint32_t ring = star.neighbours();
+    const auto arc = [ring](uint32_t from, uint32_t to) {  // both included
+        const uint32_t until = (2u << to) - 1, before_from = (1u << from) - 1;
+        return from <= to ? until & ~before_from : ((1u << ring) - 1) & (until | ~before_from);
+    };
+    const uint32_t of_v = arc(has_left ? l : 0, has_right ? r : ring - 1);
+    const uint32_t of_u = arc(has_right ? r : 0, has_left ? l : ring - 1);
+    changeAround(star, before, a, of_v, b, of_u);
+    return {of_v, of_u};
 }
 
-std::array<uint32_t, 2> ActiveMesh::merge(uint32_t v, uint32_t u) {
-    VertexRecord& a = record[v];
-    VertexRecord& b = record[u];
-    const bool open = twinOf(a.corner) == kNoCorner || twinOf(b.corner) == kNoCorner;
-    uint32_t fl = kNoCorner, fr = kNoCorner;  // their first corners: of v, of u
-    for (uint32_t c = b.corner; c != kNoCorner;) {
-        setVertexAt(c, v);
-        if (vertexAt(previousCorner(c)) == v) fl = previousCorner(c);
-        if (vertexAt(nextCorner(c)) == v) fr = c;
-        c = leftOf(c);
-        if (c == b.corner) break;
+/// The one that was `before` has become a and b, whose neighbours are told by bits.
+void ActiveMesh::changeAround(const Star& star, const VertexPulse& before, VertexPulse& a,
+                              uint32_t of_a, VertexPulse& b, uint32_t of_b) {
+    // In loops that become vector instructions.
+    constexpr uint32_t kRing = kMaxNeighbours + 1;
+    std::array<int16_t, kRing> next{}, last{}, at_a, at_b, lower, higher;
+    for (uint32_t i = 0; i < star.neighbours(); ++i) {
+        next[i] = int16_t(pulse[star.neighbour[i]].next_level);
+        last[i] = int16_t(pulse[star.neighbour[i]].last_level);
     }
-    uint32_t stays = kNoCorner;
-    if (fl != kNoCorner) {
-        const uint32_t of_u = twinOf(fl + 1), of_v = twinOf(fl + 2), vl = vertexAt(fl + 2);
+    for (uint32_t i = 0; i < kRing; ++i) {
+        at_a[i] = uint16_t(of_a) & uint16_t(1u << i) ? 1 : 0;
+        at_b[i] = uint16_t(of_b) & uint16_t(1u << i) ? 1 : 0;
+    }
+    const auto count = [&](auto& change, const auto& level, auto&& weighs, int16_t level_a,
+                           int16_t level_b, int16_t level_before) {
+        int16_t around_a = weighs(level_b, level_a), around_b = weighs(level_a, level_b);
+        for (uint32_t i = 0; i < kRing; ++i) {
+            change[i] =
+                int16_t((weighs(level_a, level[i]) & at_a[i]) +
+                        (weighs(level_b, level[i]) & at_b[i]) - weighs(level_before, level[i]));
+            around_a = int16_t(around_a + (weighs(level[i], level_a) & at_a[i]));
+            around_b = int16_t(around_b + (weighs(level[i], level_b) & at_b[i]));
+        }
+        return std::pair(uint32_t(around_a), uint32_t(around_b));
+    };
+    const auto [lower_a, lower_b] = count(
+        lower, next, [](int16_t x, int16_t y) { return int16_t(x < y); }, int16_t(a.next_level),
+        int16_t(b.next_level), int16_t(before.next_level));
+    const auto [higher_a, higher_b] = count(
+        higher, last, [](int16_t x, int16_t y) { return int16_t(x > y); }, int16_t(a.last_level),
+        int16_t(b.last_level), int16_t(before.last_level));
+    for (uint32_t i = 0; i < star.neighbours(); ++i)
+        addAround(star.neighbour[i], uint32_t(lower[i]) + (uint32_t(higher[i]) << 16));
+    a.around = lower_a + (higher_a << 16);
+    b.around = lower_b + (higher_b << 16);
+}
+
+std::array<uint32_t, 2> ActiveMesh::merge(uint32_t v, const Star& star, uint32_t u,
+                                          const Star& other) {
+    VertexPulse& a = pulse[v];
+    VertexPulse& b = pulse[u];
+    const VertexPulse before = a;
+    const bool open = !star.closed || !other.closed;
+    const uint32_t n = other.count, ring = other.neighbours();
+    uint32_t at = 0;
+    while (other.neighbour[at] != v) ++at;
+    for (uint32_t i = 0; i < n; ++i) setVertexAt(other.corner[i], v);
+    const bool has_left = other.closed || at > 0, has_right = other.closed || at < n;
+    const uint32_t fl = has_left ? previousCorner(other.corner[(at + n - 1) % n]) : kNoCorner;
+    const uint32_t fr = has_right ? other.corner[at] : kNoCorner;
+    uint32_t stays = kNoCorner, vl = kNoCorner, vr = kNoCorner;
+    if (has_left) {
+        const uint32_t of_u = twinOf(fl + 1), of_v = twinOf(fl + 2);
+        vl = vertexAt(fl + 2);
         link(of_u, of_v);
         if (corner(vl).load(kRelaxed) == fl + 2) corner(vl).store(of_u, kRelaxed);
         stays = of_v != kNoCorner ? of_v : nextCorner(of_u);
     }
-    if (fr != kNoCorner) {
-        const uint32_t of_v = twinOf(fr + 1), of_u = twinOf(fr + 2), vr = vertexAt(fr + 2);
+    if (has_right) {
+        const uint32_t of_v = twinOf(fr + 1), of_u = twinOf(fr + 2);
+        vr = vertexAt(fr + 2);
         link(of_v, of_u);
         if (corner(vr).load(kRelaxed) == fr + 2) corner(vr).store(of_v, kRelaxed);
-        if (fl == kNoCorner) stays = of_u != kNoCorner ? of_u : nextCorner(of_v);
+        if (!has_left) stays = of_u != kNoCorner ? of_u : nextCorner(of_v);
     }
     a.corner = open ? firstCorner(stays) : stays;
 
-    const OperationId id = a.last;
-    vertex[v].moveBy(-source_->operation[id].offset(0));
-    vertex[v].normal = b.undo_normal;
-    setLast(v, b.undo_last);
+    const OperationId id = record[v].last;
+    vertex[v].moveBy(-source_->at(id).offset(0));
+    vertex[v].normal = record[u].undo_normal;
+    setLast(v, record[u].undo_last);
     setNext(v, id);
+
+    uint32_t around = 0;
+    for (uint32_t i = 0; i < star.neighbours(); ++i) {
+        const uint32_t w = star.neighbour[i];
+        if (w == u) continue;
+        addAround(w, a.weightOn(pulse[w]) - before.weightOn(pulse[w]));
+        around += pulse[w].weightOn(a);
+        if (!open && pulse[w].last_level == a.last_level)
+            a.corner = star.corner[w != vr ? i : (i + star.count - 1) % star.count];
+    }
+    for (uint32_t i = 0; i < ring; ++i) {
+        const uint32_t w = other.neighbour[i];
+        if (w == v) continue;
+        const bool new_at_v = w != vl && w != vr;
+        addAround(w, (new_at_v ? a.weightOn(pulse[w]) : 0) - b.weightOn(pulse[w]));
+        if (!new_at_v) continue;
+        around += pulse[w].weightOn(a);
+        if (!open && pulse[w].last_level == a.last_level) a.corner = other.corner[i];
+    }
+    a.around = around;
     b.name = kNoCorner;
     return {fl == kNoCorner ? fl : fl >> 2, fr == kNoCorner ? fr : fr >> 2};
 }
@@ -296,9 +416,8 @@ void ActiveMesh::moveVertex(uint32_t from, uint32_t to) {
     vertex[to] = vertex[from];
     record[to] = record[from];
     pulse[to] = pulse[from];
-    pulse[to].changed = time;
     criteria[to] = criteria[from];
-    const uint32_t first = record[to].corner;
+    const uint32_t first = pulse[to].corner;
     for (uint32_t c = first; c != kNoCorner;) {
         setVertexAt(c, to);
         c = leftOf(c);
@@ -329,13 +448,18 @@ void ActiveMesh::moveFaces(const std::vector<uint32_t>& from, const std::vector<
 }
 
 void ActiveMesh::sortInSpace() {
+    Box3i box;
+    for (const Vertex& v : vertex) box.add(v.position());
+    const Vec3i size = box.max - box.min;
+    const int shift =
+        std::max(int(std::bit_width(uint32_t(std::max({size.x, size.y, size.z})))) - 6, 0);
     const std::vector<uint32_t> place =
-        placesByKey(source_->base_vertex.size(), vertexCount(), [&](uint32_t v) {
-            const Vertex& p = vertex[v];
+        placesByKey(source_->base_vertex.size(), vertexCount(), 1 << 18, [&](uint32_t v) {
+            const Vec3i p = (vertex[v].position() - box.min) >> shift;
             return spread(uint32_t(p.x)) | spread(uint32_t(p.y)) << 1 | spread(uint32_t(p.z)) << 2;
         });
     const std::vector<uint32_t> face_place =
-        placesByKey(source_->base_triangle.size(), faceCount(), [&](uint32_t f) {
+        placesByKey(source_->base_triangle.size(), faceCount(), vertexCount(), [&](uint32_t f) {
             const auto& v = face[f].vertex;
             return std::min({place[v[0]], place[v[1]], place[v[2]]});
         });
@@ -345,14 +469,11 @@ void ActiveMesh::sortInSpace() {
     parallelForSlices(faceCount(), 16 * kGrain, [&](size_t begin, size_t end) {
         for (size_t f = begin; f < end; ++f)
             for (size_t k = 0; k < 3; ++k) {
-                face[f].vertex[k] = place[face[f].vertex[k]];
-                moved(face[f].twin[k]);
+                setVertexAt(uint32_t(4 * f + k), place[face[f].vertex[k]]);
+                moved(face[f].left[k]);
             }
     });
-    for (size_t v = 0; v < vertexCount(); ++v) {
-        moved(record[v].corner);
-        pulse[v].changed = time;
-    }
+    for (VertexPulse& p : pulse) moved(p.corner);
     permute(vertex, place);
     permute(pulse, place);
     permute(criteria, place);
@@ -368,7 +489,7 @@ std::string validateStars(const ProgressiveMesh& mesh) {
     for (const OperationId id : coarseToFine(mesh)) {
         const Operation& o = mesh.operation[id];
         const uint32_t v = vertex_of[id];
-        if (active.record[v].corner == kNoCorner)
+        if (active.pulse[v].corner == kNoCorner)
             return fmt::format("operation {}: its vertex has no triangles", id);
         if (!active.allNeighbours(v,
                                   [&](uint32_t w) { return active.pulse[w].next_level > o.level; }))

@@ -1,305 +1,396 @@
 #include "methods/pmesh/adaption.h"
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "methods/pmesh/criterion_scan.h"
 
 namespace pietra::pmesh {
 namespace {
 
-enum State : uint8_t {
-    kMarked = 1,  ///< needed, or needed by a neighbour
-    kFresh0 = 2,  ///< marked, not looked at yet: in rounds of even, of odd number
-    kFresh1 = 4,
-    kMaySplit = 8,
-    kMayUndo = 16,  ///< its last operation is not needed
-};
-constexpr size_t kBlockVertices = 4096;
 /// Operations after which sorting may pay: what fits the second-level cache needs none.
 constexpr size_t kLeastSort = 4096;
 constexpr size_t kGrain = 256;  // operations
-constexpr auto kRelaxed = std::memory_order_relaxed;
+constexpr size_t kTogether = ActiveMesh::kTogether;
 
-/// body(v) for each v of [begin, end) whose state has one of these bits, in order.
-template <class Body>
-void forStates(std::vector<uint64_t>& states, size_t begin, size_t end, uint8_t bits, Body&& body) {
-    const uint64_t mask = 0x0101010101010101u * bits;
-    for (size_t word = begin / 8; word < (end + 7) / 8; ++word) {
-        uint64_t found = std::atomic_ref(states[word]).load(kRelaxed) & mask;
-        while (found != 0) {
-            const int k = std::countr_zero(found) / 8;
-            body(uint32_t(8 * word + size_t(k)));
-            found &= ~(uint64_t(0xff) << (8 * k));
-        }
-    }
+/// body(some, first) for at most kTogether consecutive elements at a time, in parallel.
+template <class T, class Body>
+void forSome(std::vector<T>& list, Body&& body) {
+    const auto slice = [&](size_t begin, size_t end) {
+        for (; begin < end; begin += kTogether)
+            body(std::span(list).subspan(begin, std::min(kTogether, end - begin)), begin);
+    };
+    if (list.size() <= kGrain) return slice(0, list.size());
+    parallelForSlices(list.size(), kGrain, slice);
 }
 
 }  // namespace
 
-/// Calls body(block, begin, end) for all blocks, in parallel.
-template <class Body>
-void Adaption::forBlocks(Body&& body) {
-    const size_t count = mesh_.vertexCount();
-    parallelFor(block_.size(), [&](size_t b) {
-        const size_t begin = b * kBlockVertices;
-        body(block_[b], begin, std::min(begin + kBlockVertices, count));
-    });
-}
-
-/// Calls body(v, star) for all of these, in order.
-template <class Body>
-void Adaption::forStars(std::span<const uint32_t> vertices, Body&& body) const {
-    std::array<Star, ActiveMesh::kTogether> stars;
-    for (size_t begin = 0; begin < vertices.size(); begin += stars.size()) {
-        const auto some = vertices.subspan(begin, std::min(stars.size(), vertices.size() - begin));
-        mesh_.gatherStars(some, stars.data(),
-                          [&](uint32_t w) { __builtin_prefetch(&mesh_.pulse[w]); });
-        for (size_t i = 0; i < some.size(); ++i) body(some[i], stars[i]);
+PassCounts Adaption::frame(const Criterion& criterion, int most_passes) {
+    criterion_ = criterion;
+    scan();
+    PassCounts all;
+    for (int pass = 0; pass < most_passes; ++pass) {
+        findSplits();
+        merge_.clear();
+        if (split_.empty() || pass + 1 == most_passes) findMerges();
+        if (split_.empty() && merge_.empty()) break;
+        apply();
+        all.splits += uint32_t(split_.size());
+        all.merges += uint32_t(merge_.size());
+        ++all.passes;
     }
-}
-
-PassCounts Adaption::pass(const Criterion& criterion) {
-    ++mesh_.time;
-    blocker_.resize(mesh_.vertexCount());
-    mark(criterion);
-    for (uint32_t round = 0; isFresh(round); round ^= 1) force(round);
-    findMerges(criterion);
-    listWork();
-    applyWork();
-    const PassCounts counts{uint32_t(split_.size()), uint32_t(merge_.size())};
-    since_sort_ += counts.operations();
-    if (since_sort_ > std::max(kLeastSort, mesh_.vertexCount())) {
+    listWaiting();
+    tidy();
+    since_sort_ += all.operations();
+    if (since_sort_ > std::max(kLeastSort, 4 * mesh_.vertexCount())) {
         mesh_.sortInSpace();
         since_sort_ = 0;
     }
-    return counts;
+    return all;
 }
 
-int Adaption::settle(const Criterion& criterion) {
-    int passes = 1;
-    while (pass(criterion).operations() > 0) ++passes;
-    return passes;
-}
-
-void Adaption::mark(const Criterion& criterion) {
-    block_.resize((mesh_.vertexCount() + kBlockVertices - 1) / kBlockVertices);
-    states_.resize((mesh_.vertexCount() + 7) / 8);
-    forBlocks([&](Block& block, size_t begin, size_t end) {
-        uint64_t any = 0;
-        for (size_t v = begin; v < end; v += 8) {
-            uint64_t eight = 0;
-            for (size_t k = 0; k < std::min<size_t>(8, end - v); ++k) {
-                const Vertex& vertex = mesh_.vertex[v + k];
-                const VertexCriteria& criteria = mesh_.criteria[v + k];
-                const uint64_t marked =
-                    criterion.needsSplit(vertex, criteria) ? kMarked | kFresh0 : 0;
-                const uint64_t undo = criterion.needsLast(vertex, criteria) ? 0 : kMayUndo;
-                eight |= (marked | undo) << (8 * k);
-            }
-            states_[v / 8] = eight;
-            any |= eight;
-        }
-        constexpr uint64_t kEach = 0x0101010101010101u;
-        block.fresh = {(any & kEach * kFresh0) != 0, false};
-        block.may_undo = (any & kEach * kMayUndo) != 0;
-        block.may_split = false;
-        block.merge.clear();
-    });
-}
-
-bool Adaption::isFresh(uint32_t round) const {
-    return std::any_of(block_.begin(), block_.end(),
-                       [&](const Block& block) { return block.fresh[round]; });
-}
-
-void Adaption::force(uint32_t round) {
-    const uint8_t fresh = round == 0 ? kFresh0 : kFresh1;
-    forBlocks([&](Block& block, size_t begin, size_t end) {
-        if (!block.fresh[round]) return;
-        block.fresh[round] = false;
-        block.open.clear();
-        forStates(states_, begin, end, fresh, [&](uint32_t v) {
-            clearState(v, fresh);
-            if (isBlocked(v, kMarked)) {
-                markForced(blocker_[v].by, round ^ 1);
-            } else {
-                block.open.push_back(v);
-            }
-        });
-        forStars(block.open, [&](uint32_t v, const Star& star) {
-            if (!forceAround(v, star, round ^ 1)) return;
-            setState(v, kMaySplit);
-            block.may_split = true;
-        });
-    });
-}
-
-/// True if v may split; else marks those that must before it.
-bool Adaption::forceAround(uint32_t v, const Star& star, uint32_t next_round) {
-    const uint16_t level = mesh_.pulse[v].next_level;
-    uint32_t lowest = v;
-    mesh_.allNeighbours(v, star, [&](uint32_t w) {
-        const uint16_t other = mesh_.pulse[w].next_level;
-        DCHECK(other != level || level == kLeafLevel);
-        if (other < level) markForced(w, next_round);
-        if (other < mesh_.pulse[lowest].next_level) lowest = w;
-        return true;
-    });
-    if (lowest == v) return true;
-    blocker_[v] = {lowest, mesh_.time, kMarked};
-    return false;
-}
-
-/// To be visited in `round`, the next one.
-void Adaption::markForced(uint32_t w, uint32_t round) {
-    if (stateOf(w) & kMarked) return;
-    setState(w, kMarked | (round == 0 ? kFresh0 : kFresh1));
-    std::atomic_ref(block_[w / kBlockVertices].fresh[round]).store(true, kRelaxed);
-}
-
-void Adaption::findMerges(const Criterion& criterion) {
-    forBlocks([&](Block& block, size_t begin, size_t end) {
-        if (!block.may_undo) return;
-        block.open.clear();
-        forStates(states_, begin, end, kMayUndo, [&](uint32_t u) {
-            if (!(stateOf(u) & kMarked) && !isBlocked(u, kMayUndo)) block.open.push_back(u);
-        });
-        std::vector<uint32_t> others;
-        forStars(block.open, [&](uint32_t u, const Star& star) {
-            const bool dummy = operationBefore(u).isDummy();
-            uint32_t v = dummy ? u : kNoCorner;
-            if (!allowsMerge(u, star, u, v)) return;
-            CHECK_NE(v, kNoCorner);  // or it has split again, and a neighbour has that level
-            const Operation& o = operationBefore(u);
-            const Vec3i centre = mesh_.vertex[v].position() - o.offset(0);
-            if ((stateOf(v) & kMarked) || criterion.needs(centre, o.error, o.radius)) return;
-            block.merge.push_back({v, u});
-            others.push_back(v);
-        });
-        size_t i = 0, kept = 0;
-        forStars(others, [&](uint32_t v, const Star& star) {
-            Merge& merge = block.merge[i++];
-            if (allowsMerge(v, star, merge.u, merge.v)) block.merge[kept++] = merge;
-        });
-        block.merge.resize(kept);
-    });
-}
-
-/// Whether the neighbours of an end of the operation that made u allow to undo it. Finds v.
-bool Adaption::allowsMerge(uint32_t end, const Star& star, uint32_t u, uint32_t& v) {
-    const uint16_t level = mesh_.pulse[u].last_level;
-    return mesh_.allNeighbours(end, star, [&](uint32_t w) {
-        if (w == u) return true;
-        const uint16_t other = mesh_.pulse[w].last_level;
-        if (other == level) return v = w, true;
-        if (other > level) {
-            blocker_[u] = {w, mesh_.time, kMayUndo};
-            return false;
-        }
-        return !(stateOf(w) & kMarked);
-    });
-}
-
-/// The work of all blocks in the order of the vertices, with places for what is new.
-void Adaption::listWork() {
-    split_.clear();
-    merge_.clear();
-    uint32_t u = uint32_t(mesh_.vertexCount()), face = uint32_t(mesh_.faceCount());
-    for (size_t b = 0; b < block_.size(); ++b) {
-        const Block& block = block_[b];
-        merge_.insert(merge_.end(), block.merge.begin(), block.merge.end());
-        if (!block.may_split) continue;
-        const size_t begin = b * kBlockVertices;
-        const size_t end = std::min(begin + kBlockVertices, mesh_.vertexCount());
-        forStates(states_, begin, end, kMaySplit, [&](uint32_t v) {
-            const Operation& o = mesh_.source().operation[mesh_.record[v].next];
-            split_.push_back({v, u, face});
-            if (o.isDummy()) return;
-            ++u;
-            face += (o.rankLeft() != kNoRank) + (o.rankRight() != kNoRank);
-        });
+void Adaption::scan() {
+    const size_t count = mesh_.vertexCount();
+    for (VertexSet* set : {&marked_, &fresh_, &may_split_, &released_, &may_merge_, &unknown_}) {
+        set->clear();
+        set->resize(count);
     }
-    mesh_.resize(u, face);
+    parallelForSlices(marked_.words(), 64, [&](size_t begin, size_t end) {
+        for (size_t w = begin; w < end; ++w) {
+            const size_t first = 64 * w;
+            auto [split, merge] =
+                scanVertices(criterion_, &mesh_.vertex[first], &mesh_.criteria[first],
+                             std::min<size_t>(64, count - first));
+            if (split != 0) split = withoutProvisional(w, split);
+            marked_.insertWord(w, split);
+            fresh_.insertWord(w, split);
+            may_merge_.insertWord(w, merge);
+        }
+    });
+}
+
+/// Of vertices 64 w and on: what criteria that are only a reference's need is not needed yet, but
+/// to be loaded.
+uint64_t Adaption::withoutProvisional(size_t w, uint64_t needed) {
+    for (uint64_t bits = needed; bits != 0; bits &= bits - 1) {
+        const uint32_t v = uint32_t(64 * w + size_t(std::countr_zero(bits)));
+        if (!mesh_.record[v].provisional) continue;
+        const bool is_loaded = mesh_.isNextLoaded(v);
+        if (is_loaded) {
+            mesh_.updateCriteria(v);
+        } else {
+            unknown_.insert(v);
+        }
+        if (!is_loaded || !criterion_.needsSplit(mesh_.vertex[v], mesh_.criteria[v]))
+            needed &= ~(bits & (0 - bits));
+    }
+    return needed;
+}
+
+void Adaption::gather(Some vertices, Star* stars) const {
+    mesh_.gatherStars(vertices, stars, [&](uint32_t w) { __builtin_prefetch(&mesh_.pulse[w]); });
+}
+
+void Adaption::mark(uint32_t v) {
+    if (marked_.insert(v)) fresh_.insert(v);
+}
+
+void Adaption::maySplit(uint32_t v) {
+    if (mesh_.isNextLoaded(v)) may_split_.insert(v);
+}
+
+void Adaption::findSplits() {
+    for (fresh_.take(list_); !list_.empty(); fresh_.take(list_))
+        forSome(list_, [&](Some some, size_t) { findSplits(some); });
+    may_split_.take(list_);
+    placeSplits();
+}
+
+/// Marks those that must split before; where there are none, a vertex may.
+void Adaption::findSplits(Some fresh) {
+    std::array<uint32_t, kTogether> waiting;
+    std::array<Star, kTogether> stars;
+    size_t count = 0;
+    for (const uint32_t v : fresh) __builtin_prefetch(&mesh_.pulse[v]);
+    for (const uint32_t v : fresh) {
+        if (mesh_.pulse[v].lower() == 0) {
+            maySplit(v);
+        } else {
+            waiting[count++] = v;
+        }
+    }
+    gather({waiting.data(), count}, stars.data());
+    for (size_t i = 0; i < count; ++i) {
+        const uint16_t level = mesh_.pulse[waiting[i]].next_level;
+        const auto force = [&](uint32_t w) {
+            if (mesh_.pulse[w].next_level < level) mark(w);
+            return true;
+        };
+        if (stars[i].count == 0) {
+            mesh_.allNeighbours(waiting[i], force);
+        } else {
+            for (const uint32_t w : stars[i].ring()) force(w);
+        }
+    }
+}
+
+/// Free places first, then the arrays' ends.
+void Adaption::placeSplits() {
+    const size_t count = list_.size(), vertices = mesh_.vertexCount(), faces = mesh_.faceCount();
+    split_.resize(count);
+    const auto place = [](const std::vector<uint32_t>& free, size_t i, size_t end) {
+        return i < free.size() ? free[i] : uint32_t(end + i - free.size());
+    };
+    for (size_t i = 0; i < count; ++i)
+        split_[i] = {list_[i],
+                     place(free_vertex_, i, vertices),
+                     {place(free_face_, 2 * i, faces), place(free_face_, 2 * i + 1, faces)}};
+}
+
+/// Of those released: the u of their last operation.
+void Adaption::findCandidates() {
+    released_.take(list_);
+    forSome(list_, [&](Some some, size_t) {
+        prefetchOtherEnds(some);
+        for (uint32_t u : some) {
+            if (!mesh_.isNewEnd(u)) u = mesh_.otherEnd(u);
+            if (mesh_.canUndo(u)) may_merge_.insert(u);
+        }
+    });
+}
+
+void Adaption::setBlocked(uint32_t u, bool blocked) {
+    uint16_t& radius = mesh_.criteria[u].merge_radius;
+    radius =
+        blocked ? radius | VertexCriteria::kBlocked : radius & uint16_t(~VertexCriteria::kBlocked);
+}
+
+void Adaption::prefetchOtherEnds(Some vertices) const {
+    for (const uint32_t v : vertices) {
+        __builtin_prefetch(&mesh_.pulse[v]);
+        __builtin_prefetch(&mesh_.record[v]);
+        __builtin_prefetch(&mesh_.criteria[v], 1);
+        __builtin_prefetch(&mesh_.vertex[v]);
+    }
+    for (const uint32_t v : vertices) __builtin_prefetch(&mesh_.face[mesh_.pulse[v].corner >> 2]);
+    for (const uint32_t v : vertices)
+        for (const uint32_t w : mesh_.face[mesh_.pulse[v].corner >> 2].vertex)
+            __builtin_prefetch(&mesh_.pulse[w]);
+}
+
+void Adaption::findMerges() {
+    findCandidates();
+    none_marked_ = marked_.empty();
+    may_merge_.take(list_);
+    merge_.resize(list_.size());
+    forSome(list_, [&](Some some, size_t first) {
+        findMerges(some, std::span(merge_).subspan(first, some.size()));
+    });
+    std::erase_if(merge_, [](const Merge& merge) { return merge.v == kNoCorner; });
+}
+
+/// Whether the operation that made u is.
+bool Adaption::isNeeded(uint32_t u) const {
+    if (criterion_.needsLast(mesh_.vertex[u], mesh_.criteria[u])) return true;
+    const Operation& o = mesh_.source().at(mesh_.record[u].last);
+    return criterion_.needs(mesh_.vertex[u].position() - o.offset(o.isDummy() ? 0 : 1), o.error,
+                            o.radius);
+}
+
+bool Adaption::anyMarkedAround(uint32_t v) const {
+    return !mesh_.allNeighbours(v, [&](uint32_t w) { return !marked_.contains(w); });
+}
+
+void Adaption::findMerges(Some candidates, std::span<Merge> merges) {
+    std::array<uint32_t, kTogether> ends;
+    std::array<size_t, kTogether> of;
+    size_t count = 0;
+    for (const uint32_t u : candidates) {
+        __builtin_prefetch(&mesh_.pulse[u]);
+        __builtin_prefetch(&mesh_.record[u]);
+        __builtin_prefetch(&mesh_.vertex[u]);
+    }
+    for (const uint32_t u : candidates)
+        __builtin_prefetch(&mesh_.source().at(mesh_.record[u].last));
+    for (size_t i = 0; i < candidates.size(); ++i) {
+        const uint32_t u = candidates[i];
+        merges[i] = {kNoCorner, u, {kNoCorner, kNoCorner}};
+        const bool blocked = mesh_.pulse[u].higher() > 0;
+        setBlocked(u, blocked);
+        if (!blocked && !marked_.contains(u) && !isNeeded(u)) {
+            of[count] = i;
+            ends[count++] = u;
+        }
+    }
+    prefetchOtherEnds({ends.data(), count});
+    for (size_t j = 0; j < count; ++j) {
+        const uint32_t u = ends[j], v = mesh_.otherEnd(u);
+        if (mesh_.pulse[v].higher() > 0) {
+            setBlocked(u, true);
+        } else {
+            merges[of[j]].v = v;
+        }
+    }
+    if (none_marked_) return;
+    for (Merge& m : merges)
+        if (m.v != kNoCorner && (anyMarkedAround(m.u) || anyMarkedAround(m.v))) m.v = kNoCorner;
 }
 
 /// What an operation between `id` and those after or before it reads, but for the star.
 void Adaption::prefetch(uint32_t v, OperationId id) const {
-    __builtin_prefetch(&mesh_.source().operation[id]);
+    __builtin_prefetch(&mesh_.source().at(id));
     __builtin_prefetch(&mesh_.vertex[v], 1);
     __builtin_prefetch(&mesh_.criteria[v], 1);
-    __builtin_prefetch(&mesh_.pulse[v], 1);
 }
 
-void Adaption::applySplits(std::span<const Split> splits) {
-    std::array<uint32_t, ActiveMesh::kTogether> vertices;
-    std::array<Star, ActiveMesh::kTogether> stars;
+/// `at`: marked neighbours of the one that has split, at its end v. Those that still wait for it
+/// mark it.
+void Adaption::wakeAround(const Star& star, uint32_t v, uint32_t at) {
+    bool force = false;
+    for (; at != 0; at &= at - 1) {
+        const uint32_t w = star.neighbour[size_t(std::countr_zero(at))];
+        const VertexPulse& p = mesh_.pulse[w];
+        if (p.lower() == 0) maySplit(w);
+        force |= mesh_.pulse[v].next_level < p.next_level;
+    }
+    if (force) return mark(v);
+    if (!criterion_.needsSplit(mesh_.vertex[v], mesh_.criteria[v])) return;
+    if (mesh_.record[v].provisional) {
+        unknown_.insert(v);
+    } else {
+        mark(v);
+    }
+}
+
+/// Sets places that are not used to kNoCorner.
+void Adaption::applySplits(std::span<Split> splits) {
+    const ProgressiveMesh& source = mesh_.source();
+    std::array<uint32_t, kTogether> vertices;
+    std::array<Star, kTogether> stars;
+    for (const Split& s : splits) __builtin_prefetch(&mesh_.record[s.v], 1);
     for (size_t i = 0; i < splits.size(); ++i) {
         vertices[i] = splits[i].v;
         prefetch(splits[i].v, mesh_.record[splits[i].v].next);
+        prefetch(splits[i].u, mesh_.record[splits[i].v].next);
+        __builtin_prefetch(&mesh_.pulse[splits[i].u], 1);
+        __builtin_prefetch(&mesh_.record[splits[i].u], 1);
+        for (const uint32_t f : splits[i].face) __builtin_prefetch(&mesh_.face[f], 1);
     }
-    mesh_.gatherStars({vertices.data(), splits.size()}, stars.data(),
-                      [&](uint32_t w) { __builtin_prefetch(&mesh_.record[w]); });
+    gather({vertices.data(), splits.size()}, stars.data());
     for (const Split& s : splits)
-        for (const OperationId child : mesh_.source().operation[mesh_.record[s.v].next].child)
-            if (child != kNoOperation) __builtin_prefetch(&mesh_.source().operation[child]);
+        for (const OperationId child : source.at(mesh_.record[s.v].next).child)
+            if (child != kNoOperation && source.isLoaded(child))
+                __builtin_prefetch(&source.at(child));
     for (size_t i = 0; i < splits.size(); ++i) {
-        const Split& s = splits[i];
-        if (mesh_.source().operation[mesh_.record[s.v].next].isDummy()) {
-            mesh_.move(s.v);
+        Split& s = splits[i];
+        const Operation& o = source.at(mesh_.record[s.v].next);
+        marked_.erase(s.v);
+        uint32_t marked = 0;
+        for (uint32_t j = 0; j < stars[i].neighbours(); ++j)
+            marked |= uint32_t(marked_.contains(stars[i].neighbour[j])) << j;
+        if (o.isDummy()) {
+            mesh_.move(s.v, stars[i]);
+            s = {s.v, kNoCorner, {kNoCorner, kNoCorner}};
+            wakeAround(stars[i], s.v, marked);
         } else {
             CHECK(mesh_.orient(stars[i]));
-            mesh_.split(s.v, stars[i], s.u, s.face);
+            const auto [at_v, at_u] = mesh_.split(s.v, stars[i], s.u, s.face);
+            if (o.rankLeft() == kNoRank || o.rankRight() == kNoRank) s.face[1] = kNoCorner;
+            wakeAround(stars[i], s.v, at_v & marked);
+            wakeAround(stars[i], s.u, at_u & marked);
         }
     }
 }
 
-/// `first`: the place of the first of these in the list.
-void Adaption::applyMerges(std::span<const Merge> merges, size_t first) {
-    std::array<uint32_t, ActiveMesh::kTogether> vertices;
-    std::array<Star, ActiveMesh::kTogether> stars;
-    for (size_t i = 0; i < merges.size(); ++i) {
-        vertices[i] = merges[i].u;
+void Adaption::applyMerges(std::span<Merge> merges) {
+    std::array<uint32_t, 2 * kTogether> vertices;
+    std::array<Star, 2 * kTogether> stars;
+    const size_t count = merges.size();
+    for (const Merge& m : merges) __builtin_prefetch(&mesh_.record[m.u]);
+    for (size_t i = 0; i < count; ++i) {
+        vertices[i] = merges[i].v;
+        vertices[count + i] = merges[i].u;
         prefetch(merges[i].v, mesh_.record[merges[i].u].last);
         __builtin_prefetch(&mesh_.record[merges[i].v]);
     }
-    mesh_.gatherStars({vertices.data(), merges.size()}, stars.data(), [&](uint32_t) {});
+    gather({vertices.data(), count}, stars.data());
+    gather({vertices.data() + count, count}, stars.data() + count);
     for (const Merge& m : merges) {
         const OperationId before = mesh_.record[m.u].undo_last;
-        if (before != kNoOperation) __builtin_prefetch(&mesh_.source().operation[before]);
+        if (before != kNoOperation) __builtin_prefetch(&mesh_.source().at(before));
     }
-    for (size_t i = 0; i < merges.size(); ++i) {
-        const auto [v, u] = merges[i];
-        std::array<uint32_t, 2> faces{kNoCorner, kNoCorner};
-        if (u == v) {
-            mesh_.moveBack(v);
+    for (size_t i = 0; i < count; ++i) {
+        Merge& m = merges[i];
+        if (m.u == m.v) {
+            mesh_.moveBack(m.v, stars[i]);
+            m.u = kNoCorner;
         } else {
-            faces = mesh_.merge(v, u);
+            m.face = mesh_.merge(m.v, stars[i], m.u, stars[count + i]);
         }
-        free_vertex_[first + i] = u == v ? kNoCorner : u;
-        free_face_[2 * (first + i)] = faces[0];
-        free_face_[2 * (first + i) + 1] = faces[1];
+        const auto release = [&](uint32_t w) {
+            const VertexPulse& p = mesh_.pulse[w];
+            if (p.last_level != 0 && p.higher() == 0) released_.insert(w);
+        };
+        for (const size_t end : {i, count + i})
+            for (const uint32_t w : stars[end].ring())
+                if (w != m.u && w != m.v) release(w);
+        release(m.v);
     }
 }
 
-void Adaption::applyWork() {
-    static constexpr size_t kTogether = ActiveMesh::kTogether;
-    const auto forSome = [](const auto& list, auto&& body) {
-        parallelForSlices(list.size(), kGrain, [&](size_t begin, size_t end) {
-            for (; begin < end; begin += kTogether)
-                body(std::span(list).subspan(begin, std::min(kTogether, end - begin)), begin);
-        });
+void Adaption::apply() {
+    const size_t splits = split_.size();
+    const auto beyond = [](size_t wanted, const std::vector<uint32_t>& free) {
+        return wanted - std::min(wanted, free.size());
     };
-    forSome(split_, [&](std::span<const Split> splits, size_t) { applySplits(splits); });
-    if (merge_.empty()) return;
-    free_vertex_.resize(merge_.size());
-    free_face_.resize(2 * merge_.size());
-    forSome(merge_, [&](std::span<const Merge> m, size_t first) { applyMerges(m, first); });
-    std::erase(free_vertex_, kNoCorner);
-    std::erase(free_face_, kNoCorner);
-    mesh_.fillHoles(free_vertex_, free_face_);
+    mesh_.resize(mesh_.vertexCount() + beyond(splits, free_vertex_),
+                 mesh_.faceCount() + beyond(2 * splits, free_face_));
+    for (VertexSet* set : {&marked_, &fresh_, &may_split_, &released_, &may_merge_, &unknown_})
+        set->resize(mesh_.vertexCount());
+    const std::vector<Split> places = split_;
+    forSome(split_, [&](std::span<Split> some, size_t) { applySplits(some); });
+    forSome(merge_, [&](std::span<Merge> some, size_t) { applyMerges(some); });
+
+    free_vertex_.erase(free_vertex_.begin(),
+                       free_vertex_.begin() + ptrdiff_t(std::min(splits, free_vertex_.size())));
+    free_face_.erase(free_face_.begin(),
+                     free_face_.begin() + ptrdiff_t(std::min(2 * splits, free_face_.size())));
+    for (size_t i = 0; i < splits; ++i) {
+        if (split_[i].u == kNoCorner) free_vertex_.push_back(places[i].u);
+        for (const size_t k : {0, 1})
+            if (split_[i].face[k] == kNoCorner) free_face_.push_back(places[i].face[k]);
+    }
+    for (const Merge& m : merge_) {
+        if (m.u != kNoCorner) free_vertex_.push_back(m.u);
+        for (const uint32_t f : m.face)
+            if (f != kNoCorner) free_face_.push_back(f);
+    }
+}
+
+void Adaption::listWaiting() {
+    waiting_.clear();
+    const auto list = [&](uint32_t v) {
+        waiting_.push_back(
+            {mesh_.record[v].next, criterion_.needsSplit(mesh_.vertex[v], mesh_.criteria[v])});
+    };
+    marked_.take(list_);
+    for (const uint32_t v : list_) list(v);
+    unknown_.take(list_);
+    for (const uint32_t v : list_)  // since then it may have split or gone
+        if (mesh_.record[v].provisional && mesh_.pulse[v].name != kNoCorner) list(v);
+}
+
+/// No place is left free.
+void Adaption::tidy() {
+    findCandidates();
+    may_merge_.take(list_);
+    for (const uint32_t u : list_) setBlocked(u, false);
+    if (!free_vertex_.empty() || !free_face_.empty()) mesh_.fillHoles(free_vertex_, free_face_);
+    free_vertex_.clear();
+    free_face_.clear();
 }
 
 }  // namespace pietra::pmesh

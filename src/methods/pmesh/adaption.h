@@ -2,22 +2,28 @@
 // Parallel adaption (Derzapf et al. 2011, section 4.2): passes over the active mesh, each of which
 // applies all operations that may be applied at once.
 //
-// A pass, from the state before it:
-//   1. Mark every vertex whose next operation the criterion needs.
-//   2. A marked vertex with a neighbour of a lower level must wait: mark that neighbour. So on, in
+// A frame looks at all vertices once, for what the criterion needs and for what it does not need
+// any more. A pass, from the state before it:
+//   1. A marked vertex with a neighbour of a lower level must wait: mark that neighbour. So on, in
 //      rounds over those newly marked, until there are none. A marked one without may split.
-//   3. An operation that is not needed may be undone if it is the last of both its vertices, and no
+//   2. An operation that is not needed may be undone if it is the last of both its vertices, and no
 //      other neighbour's last one has its level or a higher one. Where both meet, splits win: no
 //      vertex around may be marked.
-//   4. Prefix sums give new vertices and faces their places; all splits and merges are done.
-//   5. The last elements move into the places that merges left; after as many operations as there
-//      are vertices, all are sorted in space.
+//   3. All splits and merges are done, new elements in free places, in the order of the vertices.
+// Each vertex counts the neighbours that it must wait for (VertexPulse::around); when none is left,
+// it is looked at in the next pass. So passes go on from what the last one changed.
+// At a frame's end the last elements move into the places that merges left; after as many
+// operations as there are vertices, all are sorted in space.
 //
 // The set of operations applied when nothing is left to do is the least one that holds all that is
 // needed and is closed under dependency: it depends on the criterion alone, not on what was before.
 //
-// The arrays after each pass are the same for any number of threads. A pass with nothing to do
-// reads 22 bytes a vertex. Not thread-safe.
+// Where some nodes of operations are not loaded, what they would split stays marked, and so nothing
+// around it merges; all of that is told (waiting()). To undo never takes
+// a node that is not loaded, as long as nodes with applied operations stay.
+//
+// The arrays after each pass are the same for any number of threads. A frame with nothing to do
+// reads 24 bytes a vertex. Not thread-safe.
 
 #include <cstdint>
 #include <span>
@@ -25,92 +31,87 @@
 
 #include "methods/pmesh/active_mesh.h"
 #include "methods/pmesh/criterion.h"
+#include "methods/pmesh/vertex_set.h"
 
 namespace pietra::pmesh {
 
 struct PassCounts {
     uint32_t splits = 0, merges = 0;  ///< dummies included
+    uint32_t passes = 0;              ///< that found something to do
     uint32_t operations() const { return splits + merges; }
 };
 
 class Adaption {
 public:
     /// `mesh` must outlive this; validate() must find no fault in it.
-    explicit Adaption(const ProgressiveMesh& mesh) : mesh_(mesh) {}
+    explicit Adaption(const ProgressiveMesh& mesh, const References* references = nullptr)
+        : mesh_(mesh, references) {}
 
-    PassCounts pass(const Criterion& criterion);
-    /// Passes until nothing is left to do. Returns their number.
-    int settle(const Criterion& criterion);
+    /// A frame of at most so many passes; ends with the first that finds nothing to do.
+    PassCounts frame(const Criterion& criterion, int most_passes);
+    PassCounts pass(const Criterion& criterion) { return frame(criterion, 1); }
+    /// Passes until nothing is left to do.
+    PassCounts settle(const Criterion& criterion) { return frame(criterion, 1 << 30); }
 
     const ActiveMesh& mesh() const { return mesh_; }
 
+    /// An operation that is marked at the end of the last frame, or that is to be known.
+    struct Waiting {
+        OperationId operation;
+        bool is_needed;  ///< or only before one that is
+    };
+    std::span<const Waiting> waiting() const { return waiting_; }
+
 private:
     struct Split {
-        uint32_t v, u, face;
+        uint32_t v, u;
+        std::array<uint32_t, 2> face;
     };
+    /// v: kNoCorner if it is not to be; equal to u: of a dummy.
     struct Merge {
         uint32_t v, u;
+        std::array<uint32_t, 2> face;
     };
-    /// What a block of consecutive vertices has to do.
-    struct Block {
-        std::array<bool, 2> fresh{};  ///< some vertex is marked and not looked at yet
-        bool may_split = false, may_undo = false;
-        std::vector<uint32_t> open;  ///< vertices whose stars must be looked at
-        std::vector<Merge> merge;
-    };
+    using Some = std::span<const uint32_t>;
 
-    /// Why a vertex could not do what it wants: a neighbour. As long as neither has changed since,
-    /// it still cannot, and its star need not be walked again.
-    struct Blocker {
-        uint32_t by = 0;
-        uint32_t time = 0;  ///< when this was found; 0: never
-        uint8_t want = 0;   ///< the bit of its state
-    };
-    bool isBlocked(uint32_t v, uint8_t want) const {
-        const Blocker& b = blocker_[v];
-        return b.want == want && mesh_.pulse[v].changed < b.time && b.by < mesh_.vertexCount() &&
-               mesh_.pulse[b.by].changed < b.time;
-    }
-    uint8_t stateOf(uint32_t v) const {
-        return uint8_t(std::atomic_ref(const_cast<uint64_t&>(states_[v / 8]))
-                           .load(std::memory_order_relaxed) >>
-                       (8 * (v % 8)));
-    }
-    void setState(uint32_t v, uint64_t bits) {
-        std::atomic_ref(states_[v / 8]).fetch_or(bits << (8 * (v % 8)), std::memory_order_relaxed);
-    }
-    void clearState(uint32_t v, uint64_t bits) {
-        std::atomic_ref(states_[v / 8])
-            .fetch_and(~(bits << (8 * (v % 8))), std::memory_order_relaxed);
-    }
-    const Operation& operationBefore(uint32_t u) const {
-        return mesh_.source().operation[mesh_.record[u].last];
-    }
-    template <class Body>
-    void forBlocks(Body&& body);
-    template <class Body>
-    void forStars(std::span<const uint32_t> vertices, Body&& body) const;
-    void mark(const Criterion& criterion);
-    bool isFresh(uint32_t round) const;
-    void force(uint32_t round);
-    bool forceAround(uint32_t v, const Star& star, uint32_t next_round);
-    void markForced(uint32_t w, uint32_t round);
-    void findMerges(const Criterion& criterion);
-    bool allowsMerge(uint32_t end, const Star& star, uint32_t u, uint32_t& v);
-    void listWork();
+    bool isNeeded(uint32_t u) const;
+    void scan();
+    uint64_t withoutProvisional(size_t w, uint64_t needed);
+    void maySplit(uint32_t v);
+    void findSplits();
+    void findSplits(Some fresh);
+    void placeSplits();
+    void mark(uint32_t v);
+    void findCandidates();
+    void setBlocked(uint32_t u, bool blocked);
+    void findMerges();
+    void findMerges(Some candidates, std::span<Merge> merges);
+    void prefetchOtherEnds(Some vertices) const;
+    bool anyMarkedAround(uint32_t v) const;
     void prefetch(uint32_t v, OperationId id) const;
-    void applySplits(std::span<const Split> splits);
-    void applyMerges(std::span<const Merge> merges, size_t first);
-    void applyWork();
+    void gather(Some vertices, Star* stars) const;
+    void applySplits(std::span<Split> splits);
+    void wakeAround(const Star& star, uint32_t v, uint32_t at);
+    void applyMerges(std::span<Merge> merges);
+    void apply();
+    void listWaiting();
+    void tidy();
 
     ActiveMesh mesh_;
-    size_t since_sort_ = 0;         ///< operations
-    std::vector<uint64_t> states_;  ///< eight vertices a word
-    std::vector<Block> block_;
-    std::vector<Blocker> blocker_;
+    Criterion criterion_;
+    VertexSet marked_;  ///< needed, or needed by a neighbour
+    VertexSet fresh_;   ///< marked, not looked at yet
+    VertexSet may_split_;
+    VertexSet released_;   ///< no neighbour's last level is higher any more
+    VertexSet unknown_;    ///< unmarked, but what is known of the next split would be needed
+    VertexSet may_merge_;  ///< the last operation, which made them, is not needed
+    bool none_marked_ = false;
+    std::vector<uint32_t> list_;
+    std::vector<Waiting> waiting_;
     std::vector<Split> split_;
     std::vector<Merge> merge_;
     std::vector<uint32_t> free_vertex_, free_face_;
+    size_t since_sort_ = 0;  ///< operations
 };
 
 }  // namespace pietra::pmesh

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "base/parallel.h"
+#include "methods/pmesh/criterion_scan.h"
 #include "methods/pmesh/pmesh_testing.h"
 #include "methods/pmesh/whole_mesh.h"
 
@@ -118,6 +119,104 @@ TEST_P(Adapted, AHundredCyclesLeaveTheBaseBitForBit) {
     EXPECT_EQ(adaption.mesh().face, base.face);
 }
 
+TEST(Criterion, NeedsNoSphereWithinOneThatItDoesNotNeed) {
+    const Mesh mesh = onLattice(test::sphereShape(8), 1 << 14);
+    std::mt19937 random(16);
+    const auto below = [&](uint32_t limit) { return int32_t(random() % limit); };
+    uint32_t inner_needed = 0, outer_only = 0;
+    for (int i = 0; i < 400; ++i) {
+        const Criterion view = randomView(random, mesh);
+        for (int j = 0; j < 500; ++j) {
+            const Vec3i centre(below(1 << 14), below(1 << 14), below(1 << 14));
+            const int32_t radius = below(200), range = 1 + below(500);
+            const Vec3i offset(below(2 * range) - range, below(2 * range) - range,
+                               below(2 * range) - range);
+            const uint32_t inner = encodeRoundedUp<11>(uint64_t(radius));
+            const double reach = glm::length(Vec3d(offset)) + decodeRadius(inner);
+            const uint32_t outer = encodeRoundedUp<11>(uint64_t(std::ceil(reach)));
+            const auto error = uint32_t(1 + below(255)),
+                       more = error + uint32_t(below(256 - error));
+            const bool is_needed = view.needs(centre + offset, error, inner);
+            const bool is_outer_needed = view.needs(centre, more, outer);
+            EXPECT_TRUE(is_outer_needed || !is_needed);
+            inner_needed += is_needed;
+            outer_only += is_outer_needed && !is_needed;
+        }
+    }
+    EXPECT_GT(inner_needed, 1000u);
+    EXPECT_GT(outer_only, 1000u);
+}
+
+TEST(Criterion, DecidesTheSameOfManyVerticesAtOnce) {
+    const Mesh mesh = onLattice(test::sphereShape(8), 1 << 12);
+    std::mt19937 random(17);
+    std::vector<Vertex> vertex(64);
+    std::vector<VertexCriteria> criteria(64);
+    uint32_t needed = 0, close = 0;
+    for (int i = 0; i < 2000; ++i) {
+        Criterion view = randomView(random, mesh);
+        for (size_t k = 0; k < 64; ++k) {
+            // Some as close to the limit as may be.
+            const auto error = uint8_t(1 + random() % 255);
+            const int32_t reach = view.reach[error];
+            const Vec3i p =
+                random() % 2 ? mesh.position[random() % mesh.position.size()]
+                             : view.eye + Vec3i(std::min(reach, 1 << 22), int32_t(random() % 3), 0);
+            vertex[k] = {p.x, p.y, p.z, 0};
+            VertexCriteria& c = criteria[k];
+            c.split_radius = uint16_t(random() % (random() % 2 ? 3 : kMaxRadiusCode));
+            c.merge_radius = random() % 4 ? uint16_t(random() % 3000) : VertexCriteria::kEverNeeded;
+            if (random() % 8 == 0) c.merge_radius |= VertexCriteria::kBlocked;
+            c.split_error = error;
+            c.merge_error = uint8_t(random());
+        }
+        const size_t count = 1 + random() % 64;
+        const ScanBits bits = scanVertices(view, vertex.data(), criteria.data(), count);
+        for (size_t k = 0; k < 64; ++k) {
+            const bool is_there = k < count;
+            EXPECT_EQ(bits.split >> k & 1, is_there && view.needsSplit(vertex[k], criteria[k]));
+            EXPECT_EQ(bits.merge >> k & 1, is_there && !view.needsLast(vertex[k], criteria[k]));
+            needed += bits.split >> k & 1;
+            Vertex next = vertex[k];
+            ++next.x;
+            close += view.needsSplit(vertex[k], criteria[k]) != view.needsSplit(next, criteria[k]);
+        }
+    }
+    EXPECT_GT(needed, 1000u);
+    EXPECT_GT(close, 100u);
+}
+
+TEST(Criterion, OfAPictureIsTheSameWithinItAndNeedsLessOutside) {
+    const Lattice lattice;
+    Camera camera;
+    camera.eye = {0, 0, 0};
+    camera.target = {100000, 0, 0};
+    const View view(camera, {1000, 1000}, lattice);
+    const Criterion criterion = criterionOf(view, lattice, 1);
+    Criterion all = criterion;
+    all.side = {};
+    const auto reachOf = [](const Criterion& c, const Vec3d& direction) {
+        int32_t far = 0;
+        for (int32_t step = 1 << 20; step > 0; step /= 2)
+            if (c.needs(Vec3i(direction * double(far + step)), 100, 10)) far += step;
+        return far;
+    };
+    const double edge = std::tan(22.5 / 180 * 3.14159265358979);
+    for (const double y : {-1.0, -0.7, 0.0, 0.7, 1.0})
+        for (const double z : {-1.0, 0.4, 1.0}) {
+            const Vec3d inside(1, 0.99 * edge * y, 0.99 * edge * z);
+            EXPECT_EQ(reachOf(criterion, inside), reachOf(all, inside));
+        }
+    int32_t before = reachOf(all, {1, 0, 0});
+    for (const double y : {1.5, 3.0, 100.0}) {
+        const int32_t outside = reachOf(criterion, glm::normalize(Vec3d(1, edge * y, 0)));
+        EXPECT_LT(outside, before);
+        EXPECT_GT(outside, 0);
+        before = outside;
+    }
+    EXPECT_LT(reachOf(criterion, {-1, 0, 0}), reachOf(all, {-1, 0, 0}) / 4);
+}
+
 uint64_t hashOf(const ActiveMesh& mesh) {
     uint64_t hash = mesh.vertexCount();
     const auto add = [&](const auto& array) {
@@ -127,6 +226,7 @@ uint64_t hashOf(const ActiveMesh& mesh) {
     add(mesh.face);
     add(mesh.pulse);
     add(mesh.record);
+    add(mesh.criteria);
     return hash;
 }
 

@@ -13,6 +13,12 @@ Criterion criterionOf(const View& view, const Lattice& lattice, double pixels) {
     const double tan_x = view.size().width / (2 * view.focal_px());
     const double tan_y = view.size().height / (2 * view.focal_px());
     const double reach_of_a_step = view.focal_px() * (1 + tan_x * tan_x + tan_y * tan_y) / pixels;
+    const Vec3d forward = -view.back();
+    const std::array<Vec3d, 4> side{view.right() + tan_x * forward, -view.right() + tan_x * forward,
+                                    view.up() + tan_y * forward, -view.up() + tan_y * forward};
+    for (size_t i = 0; i < side.size(); ++i)
+        criterion.side[i] =
+            Vec3i(glm::normalize(side[i]) * double((1 << Criterion::kSideBits) - 2));
     for (uint32_t code = 1; code < criterion.reach.size(); ++code) {
         const double reach = double(decodeError(code)) * kErrorUnit * reach_of_a_step;
         // One more for the rounding of the eye.

@@ -1,8 +1,14 @@
 #pragma once
 // Which operations a view needs: those whose error, at the point of their sphere nearest to the
-// eye, shows. Integers only, so every body of the adaption decides alike; and monotone in error and
-// sphere, so that what saturation ordered stays in order, also where a comparison is close.
+// eye, shows. Outside the picture the tolerance grows with the distance from its pyramid: a sharp
+// cut there would force long chains of splits for nothing but order.
+//
+// Integers only, so every body of the adaption decides alike; and monotone in error and sphere, so
+// that what saturation ordered stays in order, also where a comparison is close: a sphere within
+// another is neither nearer to the eye nor to the pyramid, as the sides' normals are no longer than
+// one, and rounding down is monotone.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -18,19 +24,36 @@ struct Criterion {
     /// for code 0: there is no operation.
     std::array<int32_t, 256> reach{};
 
+    /// Inward normals of the picture's sides, through the eye, in units of 2^-kSideBits, rounded
+    /// towards zero; all zero: everything is in the picture.
+    std::array<Vec3i, 4> side{};
+    static constexpr int kSideBits = 14;
+    /// Outside the picture by some distance is as if that many times farther away.
+    static constexpr int64_t kOutside = 8;
+
     static constexpr int32_t kFarthestEye = 1 << 24, kFarthest = 1 << 25;
 
     bool needs(const Vec3i& centre, uint32_t error, uint32_t radius_code) const {
         const Vec3l d(centre - eye);  // below 2^25 each
-        const int64_t distance = reach[error] + int64_t(decodeRounded<11>(radius_code));
-        return distance * distance > d.x * d.x + d.y * d.y + d.z * d.z;
+        const auto radius = int64_t(decodeRounded<11>(radius_code));
+        const int64_t distance = reach[error] + radius;
+        const int64_t squared = d.x * d.x + d.y * d.y + d.z * d.z;
+        if (distance * distance <= squared) return false;
+        int64_t inside = 0;
+        for (const Vec3i& n : side) {
+            const int64_t depth = (n.x * d.x + n.y * d.y + n.z * d.z) >> kSideBits;
+            inside = std::min(inside, depth + radius);
+        }
+        const int64_t rest = distance + kOutside * inside;
+        return rest > 0 && rest * rest > squared;
     }
     bool needsSplit(const Vertex& v, const VertexCriteria& c) const {
         return needs(v.position(), c.split_error, c.split_radius);
     }
     /// False only if the operation that the vertex came from is not needed, maybe.
     bool needsLast(const Vertex& v, const VertexCriteria& c) const {
-        return needs(v.position(), c.merge_error, c.merge_radius);
+        return c.merge_radius >= VertexCriteria::kBlocked ||
+               needs(v.position(), c.merge_error, c.merge_radius);
     }
 };
 

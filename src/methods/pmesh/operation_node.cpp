@@ -64,7 +64,7 @@ std::vector<NodeRow> rowsOf(std::span<const Node> table, int lattice_shift) {
 
 ProgressiveMesh fromNodes(const NodeForest& forest) {
     ProgressiveMesh mesh{
-        forest.lattice, forest.base_vertex, forest.base_triangle, forest.base_operation, {}};
+        forest.lattice, forest.base_vertex, forest.base_triangle, forest.base_operation, {}, {}};
     if (forest.node.empty()) return mesh;
     Operation none{};
     none.child = {kNoOperation, kNoOperation};

@@ -30,8 +30,6 @@
 
 namespace pietra::pmesh {
 
-inline constexpr uint32_t kNodeSlots = 682;  ///< 3 * 682 codes and two that mean none fill 11 bits
-
 constexpr OperationId operationId(NodeIndex node, uint32_t slot) {
     return node * kNodeSlots + slot;
 }

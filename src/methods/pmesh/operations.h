@@ -44,6 +44,9 @@ namespace pietra::pmesh {
 using OperationId = uint32_t;
 inline constexpr OperationId kNoOperation = ~0u;
 
+/// The operations of one node (operation_node.h): 3 * 682 codes and two that mean none fill 11
+/// bits.
+inline constexpr uint32_t kNodeSlots = 682;
 inline constexpr uint32_t kMaxNeighbours = 15;  ///< of a vertex that splits
 inline constexpr uint32_t kNoRank = 15;
 inline constexpr uint32_t kMaxLevel = 1022;
@@ -144,8 +147,34 @@ struct ProgressiveMesh {
     /// Parents before children; nodes (operation_node.h) have gaps between them, without
     /// operations.
     std::vector<Operation> operation;
+    /// Where only some nodes are in memory: the place of each, counted in nodes, or kNotLoaded.
+    /// Empty: all operations lie at their ids.
+    std::vector<uint32_t> place_of_node;
+    static constexpr uint32_t kNotLoaded = ~0u;
 
     uint32_t nameOf(OperationId o) const { return uint32_t(base_vertex.size()) + o; }
+    bool isLoaded(OperationId o) const {
+        return place_of_node.empty() || place_of_node[o / kNodeSlots] != kNotLoaded;
+    }
+    /// It must be loaded.
+    const Operation& at(OperationId o) const {
+        if (place_of_node.empty()) return operation[o];
+        return operation[size_t(place_of_node[o / kNodeSlots]) * kNodeSlots + o % kNodeSlots];
+    }
+};
+
+/// What is known of an operation that is not loaded: its level, and criteria that enclose its own.
+struct Reference {
+    uint16_t level;
+    uint16_t radius;
+    uint8_t error;
+    Vec3i centre;
+};
+class References {
+public:
+    virtual ~References() = default;
+    /// Of the next split of an active vertex.
+    virtual Reference referenceTo(OperationId id) const = 0;
 };
 
 /// The operations that there are, by level and id: in this order, each finds the star it was

@@ -38,7 +38,7 @@ void expectIsInput(const ActiveMesh& mesh, const Built& built) {
     EXPECT_EQ(namedTriangles(mesh), expected);
     std::map<uint32_t, Vec3i> position;
     for (uint32_t v = 0; v < mesh.vertexCount(); ++v)
-        position[mesh.record[v].name] = mesh.vertex[v].position();
+        position[mesh.pulse[v].name] = mesh.vertex[v].position();
     for (size_t v = 0; v < built.input.vertexCount(); ++v) {
         const Vec3i off = glm::abs(position[built.counts.name_of[v]] - built.input.position[v]);
         EXPECT_LE(uint32_t(std::max({off.x, off.y, off.z})), built.counts.largest_error);

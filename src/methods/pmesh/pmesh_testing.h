@@ -101,6 +101,16 @@ inline Criterion randomView(std::mt19937& random, const Mesh& mesh) {
     const double scale = std::exp2(power(random)) * kErrorUnit * 32;
     for (uint32_t code = 1; code < 256; ++code)
         criterion.reach[code] = int32_t(std::min(double(decodeError(code)) * scale, 0x1p25));
+    if (random() % 2 == 0) return criterion;
+    // A pyramid, towards somewhere in the model.
+    std::normal_distribution<double> any;
+    const Vec3d target(mesh.position[random() % mesh.position.size()]);
+    const Vec3d forward = glm::normalize(target - Vec3d(criterion.eye) + 0.5);
+    for (Vec3i& side : criterion.side) {
+        const Vec3d n =
+            glm::normalize(forward + 2.0 * Vec3d(any(random), any(random), any(random)));
+        side = Vec3i(n * double((1 << Criterion::kSideBits) - 1));
+    }
     return criterion;
 }
 
@@ -109,7 +119,7 @@ inline std::vector<Triangle> namedTriangles(const ActiveMesh& mesh) {
     std::vector<Triangle> triangles;
     for (uint32_t f = 0; f < mesh.faceCount(); ++f) {
         Triangle t;
-        for (uint32_t k = 0; k < 3; ++k) t[k] = mesh.record[mesh.vertexAt(4 * f + k)].name;
+        for (uint32_t k = 0; k < 3; ++k) t[k] = mesh.pulse[mesh.vertexAt(4 * f + k)].name;
         std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
         triangles.push_back(t);
     }
@@ -124,7 +134,7 @@ inline std::vector<std::pair<uint32_t, std::array<uint32_t, 4>>> namedVertices(
     for (uint32_t v = 0; v < mesh.vertexCount(); ++v) {
         const Vertex& p = mesh.vertex[v];
         vertices.push_back(
-            {mesh.record[v].name, {uint32_t(p.x), uint32_t(p.y), uint32_t(p.z), p.normal}});
+            {mesh.pulse[v].name, {uint32_t(p.x), uint32_t(p.y), uint32_t(p.z), p.normal}});
     }
     std::sort(vertices.begin(), vertices.end());
     return vertices;
@@ -192,26 +202,35 @@ inline void expectSound(const ActiveMesh& mesh) {
     for (uint32_t v = 0; v < mesh.vertexCount(); ++v) {
         const VertexRecord& r = mesh.record[v];
         const OperationId none = kNoOperation;
-        EXPECT_EQ(mesh.pulse[v].next_level,
-                  r.next == none ? kLeafLevel : mesh.source().operation[r.next].level);
+        if (r.next == none || mesh.isNextLoaded(v)) {
+            EXPECT_EQ(mesh.pulse[v].next_level,
+                      r.next == none ? kLeafLevel : mesh.source().at(r.next).level);
+        }
         EXPECT_EQ(mesh.pulse[v].last_level,
-                  r.last == none ? 0u : mesh.source().operation[r.last].level + 1u);
+                  r.last == none ? 0u : mesh.source().at(r.last).level + 1u);
         if (r.next == none && r.last == none) continue;  // may be irregular
-        ASSERT_NE(r.corner, kNoCorner);
-        EXPECT_EQ(mesh.vertexAt(r.corner), v);
+        ASSERT_NE(mesh.pulse[v].corner, kNoCorner);
+        EXPECT_EQ(mesh.vertexAt(mesh.pulse[v].corner), v);
         uint32_t reached = 0;
         bool closed = false;
-        for (uint32_t c = r.corner; c != kNoCorner && !closed; closed = c == r.corner) {
+        for (uint32_t c = mesh.pulse[v].corner; c != kNoCorner && !closed;
+             closed = c == mesh.pulse[v].corner) {
             ++reached;
             c = mesh.leftOf(c);
         }
         EXPECT_EQ(reached, corners[v]);
-        EXPECT_TRUE(closed || mesh.twinOf(r.corner) == kNoCorner) << "not the first corner";
+        EXPECT_TRUE(closed || mesh.twinOf(mesh.pulse[v].corner) == kNoCorner)
+            << "not the first corner";
+        uint32_t lower = 0, higher = 0;
         mesh.allNeighbours(v, [&](uint32_t w) {
+            lower += mesh.pulse[w].next_level < mesh.pulse[v].next_level;
+            higher += mesh.pulse[w].last_level > mesh.pulse[v].last_level;
             const uint16_t level = mesh.pulse[w].next_level;
             EXPECT_TRUE(level != mesh.pulse[v].next_level || level == kLeafLevel) << "equal levels";
             return true;
         });
+        EXPECT_EQ(mesh.pulse[v].lower(), lower);
+        EXPECT_EQ(mesh.pulse[v].higher(), higher);
     }
 }
 

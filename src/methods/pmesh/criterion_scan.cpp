@@ -1,0 +1,134 @@
+#include "methods/pmesh/criterion_scan.h"
+
+#include <bit>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "methods/pmesh/criterion_scan.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#ifndef PIETRA_PMESH_CERTAIN_BITS
+#define PIETRA_PMESH_CERTAIN_BITS
+namespace pietra::pmesh {
+
+/// Of one test on some vertices: a bit each.
+struct CertainBits {
+    uint64_t yes = 0, open = 0;
+};
+struct CertainScan {
+    CertainBits split, last;
+    size_t count = 0;  ///< vertices looked at
+};
+
+}  // namespace pietra::pmesh
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace pietra::pmesh::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using F = HWY_CAPPED(float, 16);
+using I = hn::Rebind<int32_t, F>;
+using U = hn::Rebind<uint32_t, F>;
+using VF = hn::Vec<F>;
+using VU = hn::Vec<U>;
+
+/// decodeRounded<11>(): such a code is the upper part of a float, but for those below 2048.
+HWY_INLINE VF radiusOf(const VU code) {
+    const F f;
+    const U u;
+    const VU bits = hn::Add(hn::ShiftLeft<12>(code), hn::Set(u, (127 + 10) << 23));
+    const VF small = hn::ConvertTo(f, hn::BitCast(I(), code));
+    return hn::IfThenElse(hn::RebindMask(f, hn::Lt(code, hn::Set(u, 2048))), small,
+                          hn::BitCast(f, bits));
+}
+
+struct Scanner {
+    const Criterion& criterion;
+    VF x, y, z, squared;  // from the eye
+
+    /// Relative errors are below 2^-20: a few roundings to 24 bits.
+    HWY_INLINE void test(const VU packed, size_t at, CertainBits& result) const {
+        const F f;
+        const VF radius = radiusOf(hn::And(packed, hn::Set(U(), 0xffff)));
+        const auto error = hn::BitCast(I(), hn::ShiftRight<16>(packed));
+        const VF reach = hn::ConvertTo(f, hn::GatherIndex(I(), criterion.reach.data(), error));
+        const VF distance = hn::Add(reach, radius), limit = hn::Mul(distance, distance);
+        const VF above = hn::Set(f, 1 + 0x1p-19f);
+        const auto shows = hn::Gt(limit, hn::Mul(squared, above));
+        const auto may_show = hn::Ge(hn::Mul(limit, above), squared);
+        // Depths below the sides have absolute errors, relative to the distance.
+        VF depth = radius;
+        for (const Vec3i& n : criterion.side) {
+            const auto scaled = [&](int32_t c) {
+                return hn::Set(f, float(c) * (1.0f / (1 << Criterion::kSideBits)));
+            };
+            const VF inside = hn::Add(hn::Add(hn::Mul(x, scaled(n.x)), hn::Mul(y, scaled(n.y))),
+                                      hn::Mul(z, scaled(n.z)));
+            depth = hn::Min(depth, hn::Add(inside, radius));
+        }
+        const VF margin = hn::Add(hn::Mul(distance, hn::Set(f, 0x1p-19f)), hn::Set(f, 2));
+        const auto in_picture = hn::Ge(depth, margin);
+        const auto yes = hn::And(shows, in_picture);
+        put(yes, at, result.yes);
+        put(hn::AndNot(yes, may_show), at, result.open);
+    }
+
+    static HWY_INLINE void put(hn::Mask<F> mask, size_t at, uint64_t& bits) {
+        alignas(8) uint8_t bytes[8] = {};
+        hn::StoreMaskBits(F(), mask, bytes);
+        bits |= uint64_t(bytes[0] | bytes[1] << 8) << at;
+    }
+};
+
+CertainScan scanCertain(const Criterion& criterion, const Vertex* vertex,
+                        const VertexCriteria* criteria, size_t count) {
+    const F f;
+    const I i;
+    const U u;
+    CertainScan scan;
+    const size_t lanes = hn::Lanes(f);
+    for (; scan.count + lanes <= count; scan.count += lanes) {
+        hn::Vec<I> x, y, z, normal;
+        hn::LoadInterleaved4(i, &vertex[scan.count].x, x, y, z, normal);
+        const VF dx = hn::ConvertTo(f, hn::Sub(x, hn::Set(i, criterion.eye.x)));
+        const VF dy = hn::ConvertTo(f, hn::Sub(y, hn::Set(i, criterion.eye.y)));
+        const VF dz = hn::ConvertTo(f, hn::Sub(z, hn::Set(i, criterion.eye.z)));
+        const VF squared = hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz));
+        const Scanner scanner{criterion, dx, dy, dz, squared};
+        VU split, last;
+        hn::LoadInterleaved2(u, reinterpret_cast<const uint32_t*>(criteria + scan.count), split,
+                             last);
+        scanner.test(split, scan.count, scan.split);
+        scanner.test(last, scan.count, scan.last);
+    }
+    return scan;
+}
+
+}  // namespace pietra::pmesh::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace pietra::pmesh {
+
+HWY_EXPORT(scanCertain);
+
+ScanBits scanVertices(const Criterion& criterion, const Vertex* vertex,
+                      const VertexCriteria* criteria, size_t count) {
+    const CertainScan scan = HWY_DYNAMIC_DISPATCH(scanCertain)(criterion, vertex, criteria, count);
+    uint64_t split = scan.split.yes, last = scan.last.yes;
+    const uint64_t rest = scan.count < 64 ? ~uint64_t(0) << scan.count : 0;
+    const uint64_t all = count < 64 ? (uint64_t(1) << count) - 1 : ~uint64_t(0);
+    for (uint64_t open = (scan.split.open | rest) & all; open != 0; open &= open - 1) {
+        const auto k = size_t(std::countr_zero(open));
+        split |= uint64_t(criterion.needsSplit(vertex[k], criteria[k])) << k;
+    }
+    for (uint64_t open = (scan.last.open | rest) & all; open != 0; open &= open - 1) {
+        const auto k = size_t(std::countr_zero(open));
+        last |= uint64_t(criterion.needsLast(vertex[k], criteria[k])) << k;
+    }
+    return {split, ~last & all};
+}
+
+}  // namespace pietra::pmesh
+#endif

@@ -1,0 +1,118 @@
+#include "methods/pmesh/resident_nodes.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "base/check.h"
+
+namespace pietra::pmesh {
+
+ResidentNodes::ResidentNodes(NodeForest forest, uint32_t most)
+    : row_(std::move(forest.row)), state_(row_.size()), reference_level_(most), free_place_(most) {
+    mesh_.lattice = forest.lattice;
+    mesh_.base_vertex = std::move(forest.base_vertex);
+    mesh_.base_triangle = std::move(forest.base_triangle);
+    mesh_.base_operation = std::move(forest.base_operation);
+    mesh_.operation.resize(size_t(most) * kNodeSlots);
+    mesh_.place_of_node.assign(row_.size(), ProgressiveMesh::kNotLoaded);
+    std::iota(free_place_.rbegin(), free_place_.rend(), 0u);
+    for (NodeIndex n = 0; n < row_.size(); ++n)
+        if (row_[n].parent == kNoNode) {
+            state_[n].is_pinned = true;
+            CHECK(arrive(n, forest.node[n]));
+        }
+}
+
+Reference ResidentNodes::referenceTo(OperationId id) const {
+    const NodeIndex n = nodeOf(id), parent = row_[n].parent;
+    const auto& levels = reference_level_[mesh_.place_of_node[parent]];
+    const size_t side = row_[parent].child[0] == n ? 0 : 1;
+    return {levels[side][slotIn(id)], row_[n].radius, row_[n].error, row_[n].centre};
+}
+
+/// Nodes whose operations are applied: of each vertex the one that made it, and its last one.
+void ResidentNodes::pin(const ActiveMesh& mesh) {
+    for (NodeIndex n = 0; n < row_.size(); ++n) state_[n].is_pinned = row_[n].parent == kNoNode;
+    const auto base = uint32_t(mesh_.base_vertex.size());
+    for (const VertexPulse& p : mesh.pulse)
+        if (p.name >= base) state_[nodeOf(p.name - base)].is_pinned = true;
+    for (const VertexRecord& r : mesh.record)
+        if (r.last != kNoOperation) state_[nodeOf(r.last)].is_pinned = true;
+    // Rows lie parents before children.
+    for (NodeIndex n = NodeIndex(row_.size()); n-- > 0;)
+        if (state_[n].is_pinned && row_[n].parent != kNoNode)
+            state_[row_[n].parent].is_pinned = true;
+}
+
+void ResidentNodes::note(const Adaption& adaption) {
+    ++frame_;
+    pin(adaption.mesh());
+    std::vector<NodeIndex> asked;
+    for (const Adaption::Waiting& w : adaption.waiting())
+        if (mesh_.isLoaded(w.operation)) {
+            state_[nodeOf(w.operation)].is_in_use = true;
+        } else {
+            asked.push_back(nodeOf(w.operation));
+        }
+    std::sort(asked.begin(), asked.end());
+    asked.erase(std::unique(asked.begin(), asked.end()), asked.end());
+    for (const NodeIndex n : asked_)
+        if (!std::binary_search(asked.begin(), asked.end(), n)) state_[n].asked = 0;
+    for (const NodeIndex n : asked) ++state_[n].asked;
+    required_ = asked.size();
+    for (State& s : state_)
+        if (std::exchange(s.is_in_use, false) || s.is_pinned) s.last_used = frame_, ++required_;
+    asked_ = std::move(asked);
+}
+
+std::vector<NodeIndex> ResidentNodes::requests(size_t most) const {
+    std::vector<NodeIndex> nodes;
+    for (const NodeIndex n : asked_)
+        if (!isLoaded(n)) nodes.push_back(n);
+    std::stable_sort(nodes.begin(), nodes.end(),
+                     [&](NodeIndex a, NodeIndex b) { return state_[a].asked > state_[b].asked; });
+    nodes.resize(std::min(most, nodes.size()));
+    return nodes;
+}
+
+/// Of those that may leave, that which was not used for longest.
+bool ResidentNodes::makeRoom() {
+    if (!free_place_.empty()) return true;
+    NodeIndex oldest = kNoNode;
+    for (NodeIndex n = 0; n < row_.size(); ++n) {
+        const State& s = state_[n];
+        if (!isLoaded(n) || s.is_pinned || s.loaded_children > 0 || s.last_used == frame_) continue;
+        if (oldest == kNoNode || s.last_used < state_[oldest].last_used) oldest = n;
+    }
+    return oldest != kNoNode && evict(oldest);
+}
+
+bool ResidentNodes::arrive(NodeIndex index, const OperationNode& node) {
+    const NodeIndex parent = row_[index].parent;
+    if (isLoaded(index) || (parent != kNoNode && !isLoaded(parent)) || !makeRoom()) return false;
+    const uint32_t place = free_place_.back();
+    free_place_.pop_back();
+    mesh_.place_of_node[index] = place;
+    for (size_t s = 0; s < node.operation.size(); ++s)
+        mesh_.operation[size_t(place) * kNodeSlots + s] =
+            toOperation(index, row_[index], node.operation[s]);
+    reference_level_[place] = node.reference_level;
+    if (parent != kNoNode) ++state_[parent].loaded_children;
+    state_[index].asked = 0;
+    state_[index].last_used = frame_;
+    ++loaded_;
+    return true;
+}
+
+bool ResidentNodes::evict(NodeIndex index) {
+    State& s = state_[index];
+    if (!isLoaded(index) || s.is_pinned || s.loaded_children > 0) return false;
+    free_place_.push_back(mesh_.place_of_node[index]);
+    mesh_.place_of_node[index] = ProgressiveMesh::kNotLoaded;
+    --state_[row_[index].parent].loaded_children;
+    --loaded_;
+    return true;
+}
+
+}  // namespace pietra::pmesh
