@@ -12,9 +12,10 @@ namespace pietra {
 namespace {
 
 constexpr Method kMethods[] = {
-    {"tetra", "Adaptive TetraPuzzles: patches in a hierarchy of tetrahedra", tetra::build, nullptr},
-    {"pmesh", "progressive mesh: every vertex split by itself, in memory so far", pmesh::build,
-     pmesh::openModel},
+    {"tetra", "Adaptive TetraPuzzles: patches in a hierarchy of tetrahedra", tetra::build, true,
+     nullptr},
+    {"pmesh", "progressive mesh: vertex by vertex; to be extracted, not drawn yet", pmesh::build,
+     false, pmesh::openModel},
 };
 
 }  // namespace
@@ -31,6 +32,11 @@ std::unique_ptr<AdaptiveModel> openAdaptive(const ModelReader& reader) {
             reader.path(), "",
             fmt::format("its method, {}, is unknown to this program", reader.info().method));
     return method->open(reader);
+}
+
+bool provesErrors(const ModelInfo& info) {
+    const Method* method = findMethod(info.method);
+    return method && method->proven;
 }
 
 const Method* findMethod(std::string_view name) {

@@ -13,6 +13,8 @@ namespace pietra {
 std::span<const Method> methods();
 /// Null where there is none of this name.
 const Method* findMethod(std::string_view name);
+/// Of a model: whether its errors are proven bounds, or estimates.
+bool provesErrors(const ModelInfo& info);
 
 /// Null for a model whose pages are patches. Throws InputError where the program lacks its method.
 std::unique_ptr<AdaptiveModel> openAdaptive(const ModelReader& reader);

@@ -51,6 +51,8 @@ struct Method {
     /// when it does. Stays within settings.memory_bytes. Output bytes depend on the input, the
     /// precision and the patch sizes alone.
     BuildReport (*build)(TriangleSource& source, const BuildSettings& settings, Progress& progress);
+    /// Errors are proven bounds of the distance to the input; else estimates.
+    bool proven;
     /// Null for a method whose pages are patches, of which the house makes cuts itself. The reader,
     /// of a file of this method, must outlive the result. Throws InputError.
     std::unique_ptr<AdaptiveModel> (*open)(const ModelReader& reader) = nullptr;

@@ -181,8 +181,9 @@ int ExtractVerb::run(const RunContext& context) {
     context.progress.setStages(1);
     const ExportReport report = adaptive ? writeAdaptive(model, *adaptive, max_error, context)
                                          : writeCut(model, max_error, context);
-    logInfo(fmt::format("{}: {} triangles, {} vertices, error at most {:.6g}", output_,
-                        report.triangles, report.vertices, max_error));
+    logInfo(fmt::format("{}: {} triangles, {} vertices, error {} {:.6g}", output_, report.triangles,
+                        report.vertices, provesErrors(model.info()) ? "at most" : "estimated at",
+                        max_error));
     writeReport(
         context.common.report,
         {{"triangles", report.triangles}, {"vertices", report.vertices}, {"max_error", max_error}},

@@ -8,6 +8,7 @@
 #include "apps/pietra/json_report.h"
 #include "apps/pietra/verbs.h"
 #include "base/text.h"
+#include "methods/method_table.h"
 #include "store/model_reader.h"
 
 namespace pietra {
@@ -59,6 +60,7 @@ Json infoJson(const ModelReader& model) {
             {"bytes", model.fileBytes()},
             {"bytes_per_input_triangle", bytesPerTriangle(model)},
             {"max_error", maxError(model)},
+            {"errors_proven", provesErrors(info)},
             {"quantisation_error", info.quantisation_error * info.lattice.step},
             {"dropped",
              {{"degenerate", info.dropped_degenerate}, {"duplicate", info.dropped_duplicate}}}};
@@ -89,7 +91,8 @@ std::string infoText(const ModelReader& model) {
                                       info.triangles_stored, model.nodes().size(), info.levels)) +
            line("size", fmt::format("{}, {:.2f} bytes an input triangle",
                                     formatBytes(model.fileBytes()), bytesPerTriangle(model))) +
-           line("largest error", fmt::format("{:.6g}", maxError(model)));
+           line("largest error", fmt::format("{:.6g}{}", maxError(model),
+                                             provesErrors(info) ? "" : ", an estimate"));
 }
 
 class InfoVerb : public Verb {
