@@ -93,22 +93,25 @@ inline std::string faultOf(const std::string& path) {
     }
 }
 
-/// The largest resident memory of the process while an opened source is read once, and the number
-/// of triangles that come.
-struct ReadingMemory {
-    size_t most;
-    uint64_t triangles = 0;
-};
-inline ReadingMemory memoryOfReading(TriangleSource& source) {
-    ReadingMemory memory{residentBytes()};
+/// The number of triangles of the files, which are opened and read once. The process must take no
+/// more than `megabytes` for that, beside what it had.
+inline uint64_t trianglesReadWithin(int megabytes, const std::vector<std::string>& paths) {
+    const size_t before = residentBytes();
+    const auto source = openSource(paths);
+    size_t most = 0;
+    uint64_t count = 0;
     VertexBatch vertices;
     TriangleBatch triangles;
-    while (source.readVertices(vertices)) memory.most = std::max(memory.most, residentBytes());
-    while (source.readTriangles(triangles)) {
-        memory.most = std::max(memory.most, residentBytes());
-        memory.triangles += triangles.triangle.size();
+    while (source->readVertices(vertices)) most = std::max(most, residentBytes());
+    while (source->readTriangles(triangles)) {
+        most = std::max(most, residentBytes());
+        count += triangles.triangle.size();
     }
-    return memory;
+#ifdef __SANITIZE_ADDRESS__  // which keeps freed memory for a while
+    most = std::min(most, before);
+#endif
+    EXPECT_LT(most, before + (size_t(megabytes) << 20)) << paths[0];
+    return count;
 }
 
 /// The bytes of a gzip file that holds `text`.
