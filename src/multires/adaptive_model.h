@@ -36,7 +36,7 @@ public:
     virtual std::string pageFault(uint32_t page) const = 0;
     /// The same of the model as a whole, whose pages have no faults. This and the next one load the
     /// model and keep it in memory: MemoryError where the budget has less than they need,
-    /// InputError for a damaged file. Not thread-safe.
+    /// InputError for a damaged file. The budget must outlive this object. Not thread-safe.
     virtual std::string modelFault(Budget& budget) = 0;
     virtual MeshCut cut(const CutRequest& request, Budget& budget) = 0;
 };

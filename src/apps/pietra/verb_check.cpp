@@ -158,11 +158,11 @@ std::string CheckVerb::tempDir() const {
 int CheckVerb::run(const RunContext& context) {
     const ThreadLimit threads(limits_.threads());
     const ModelReader model(file_);
-    const auto adaptive = openAdaptive(model);
     const size_t taken =
         kProgramBytes + model.nodes().size() * (sizeof(Node) + 64) +
-        (adaptive ? 0 : 2 * size_t(limits_.threads()) * largestDecodedPageBytes(model));
+        (model.hasPatches() ? 2 * size_t(limits_.threads()) * largestDecodedPageBytes(model) : 0);
     Budget budget(limits_.memoryBytes(taken + kWorkBytes, "checking this model") - taken);
+    const auto adaptive = openAdaptive(model);
     const ModelCheckSettings settings{cuts_, seed_, samples_, input_, tempDir()};
     const ModelCheckReport report =
         adaptive ? checkAdaptive(model, *adaptive, settings, budget, context.progress)

@@ -43,7 +43,7 @@ private:
     Cut select(const ModelReader& model) const;
     CutRequest request(const Lattice& lattice) const;
     ExportReport writeCut(const ModelReader& model, double& max_error, const RunContext& context);
-    ExportReport writeAdaptive(const ModelReader& model, AdaptiveModel& adaptive, double& max_error,
+    ExportReport writeAdaptive(const ModelReader& model, double& max_error,
                                const RunContext& context);
     size_t budgetBytes(const ModelReader& model, size_t in_flight) const;
     std::string tempDir() const;
@@ -151,12 +151,13 @@ ExportReport ExtractVerb::writeCut(const ModelReader& model, double& max_error,
     return report;
 }
 
-ExportReport ExtractVerb::writeAdaptive(const ModelReader& model, AdaptiveModel& adaptive,
-                                        double& max_error, const RunContext& context) {
+ExportReport ExtractVerb::writeAdaptive(const ModelReader& model, double& max_error,
+                                        const RunContext& context) {
     const size_t taken = kProgramBytes + model.nodes().size() * sizeof(Node);
     Budget budget(limits_.memoryBytes(taken, "extracting from this model") - taken);
+    const auto adaptive = openAdaptive(model);
     context.progress.beginStage("extract", 0);
-    const MeshCut cut = adaptive.cut(request(model.info().lattice), budget);
+    const MeshCut cut = adaptive->cut(request(model.info().lattice), budget);
     max_error = cut.max_error * model.info().lattice.step;
     const uint64_t triangles = cut.mesh.triangleCount();
     warnAbout(cut.below_finest, cut.over_budget, max_error, triangles);
@@ -176,11 +177,10 @@ int ExtractVerb::run(const RunContext& context) {
     checkOutput(output_, context.common.force);
     const ThreadLimit threads(limits_.threads());
     const ModelReader model(file_);
-    const auto adaptive = openAdaptive(model);
     double max_error = 0;
     context.progress.setStages(1);
-    const ExportReport report = adaptive ? writeAdaptive(model, *adaptive, max_error, context)
-                                         : writeCut(model, max_error, context);
+    const ExportReport report = model.hasPatches() ? writeCut(model, max_error, context)
+                                                   : writeAdaptive(model, max_error, context);
     logInfo(fmt::format("{}: {} triangles, {} vertices, error {} {:.6g}", output_, report.triangles,
                         report.vertices, provesErrors(model.info()) ? "at most" : "estimated at",
                         max_error));
