@@ -6,10 +6,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdlib>
 
-#include "geometry/bounds.h"
+#include "base/stopwatch.h"
 #include "render/raster/rasteriser.h"
 #include "runtime/scene.h"
 #include "runtime/standard_paths.h"
@@ -31,27 +30,15 @@ struct Way {
     std::vector<double> ms, triangles;
 
     void draw(const std::vector<ModelPatches>& models) {
-        const auto start = std::chrono::steady_clock::now();
+        const Stopwatch watch;
         rasteriser.restart(models[0].view, *models[0].lattice, {});
         rasteriser.draw(models, leave_out_hidden);
         rasteriser.finish();
-        ms.push_back(
-            std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-                .count());
+        ms.push_back(watch.ms());
         triangles.push_back(
             double(rasteriser.statistics().triangles - rasteriser.statistics().triangles_hidden));
     }
 };
-
-/// Centres of the finest nodes.
-std::vector<Vec3d> pointsOf(const std::vector<const ModelReader*>& models) {
-    std::vector<Vec3d> points;
-    for (const ModelReader* model : models)
-        for (const Node& node : model->nodes())
-            if (node.isLeaf())
-                points.push_back(model->info().lattice.toInput(Vec3i(node.bounds.centre)));
-    return points;
-}
 
 }  // namespace
 
@@ -63,7 +50,7 @@ int main(int argc, char** argv) {
     for (int i = 4; i < argc; ++i)
         models.push_back(readers.emplace_back(std::make_unique<ModelReader>(argv[i])).get());
     const CameraPath path =
-        standardPath(*parseStandardPath(argv[1]), pointsOf(models), UpAxis::kZ, kSize);
+        standardPath(*parseStandardPath(argv[1]), coarseSurface(models), UpAxis::kZ, kSize);
     Scene scene(models, {size_t(2) << 30, 1});
     const View any({}, kSize, {});
     Way way[2] = {{Rasteriser(any, {}, samples, {}), false, {}, {}},

@@ -110,7 +110,8 @@ public:
         : view_(view), renderer_(kSize, samples, size_t(256) << 20) {
         for (uint32_t i = 0; i < scene.patches.size(); ++i) {
             renderer_.upload({0, i}, {scene.patches[i].mesh, 1});
-            items_.push_back({{0, i}, 0, scene.patches[i].one_sided, i, {}, 0});
+            items_.push_back(scene.patches[i]);
+            items_.back().page = {0, i};
         }
     }
     /// Waits until all is done; nothing is read back.
@@ -129,7 +130,7 @@ public:
 private:
     const View& view_;
     GlRenderer renderer_;
-    std::vector<GlItem> items_;
+    std::vector<DrawPatch> items_;
 };
 
 void measure(const Scene& scene, int samples, int rounds, const GlContext* context) {
