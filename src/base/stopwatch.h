@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <thread>
+#include <utility>
 
 namespace pietra {
 
@@ -11,6 +12,11 @@ public:
     double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
     double ms() const { return 1e3 * seconds(); }
     void restart() { start_ = Clock::now(); }
+    /// ms(), and starts again at that moment.
+    double lapMs() {
+        const Clock::time_point now = Clock::now(), before = std::exchange(start_, now);
+        return std::chrono::duration<double, std::milli>(now - before).count();
+    }
     /// Until `seconds` have passed since the start.
     void wait(double seconds) const {
         std::this_thread::sleep_until(start_ + std::chrono::duration_cast<Clock::duration>(

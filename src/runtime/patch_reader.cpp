@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 
 #include "base/check.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 
 namespace pietra {
 
@@ -46,14 +46,13 @@ void visitPatches(const ModelReader& model, std::span<const NodeIndex> nodes,
 
 ReadTimes visitInOrder(const ModelReader& model, std::span<const NodeIndex> nodes, size_t in_flight,
                        const RunVisitor& visit) {
-    using Clock = std::chrono::steady_clock;
     const std::vector<PageRun> runs = pageRuns(model.nodes(), nodes);
     std::atomic<int64_t> load_ns{0}, decode_ns{0};
     const auto read = [&](size_t i) {
-        const auto start = Clock::now();
+        Stopwatch watch;
         std::vector<std::byte> bytes;
         model.readPage(runs[i].page, bytes);
-        const auto loaded = Clock::now();
+        load_ns += int64_t(watch.lapMs() * 1e6);
         std::vector<Mesh> page;
         std::string fault;
         if (!model.tryDecode(runs[i].page, bytes, page, fault))
@@ -61,8 +60,7 @@ ReadTimes visitInOrder(const ModelReader& model, std::span<const NodeIndex> node
         DecodedRun run{runs[i].nodes, {}};
         for (const NodeIndex node : run.nodes)
             run.patches.push_back(std::move(page[model.nodes()[node].patch]));
-        load_ns += (loaded - start).count();
-        decode_ns += (Clock::now() - loaded).count();
+        decode_ns += int64_t(watch.ms() * 1e6);
         return run;
     };
     orderedPipeline(runs.size(), in_flight, read, visit);

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "apps/pietra/json_report.h"
@@ -15,6 +14,7 @@
 #include "apps/pietra/verbs.h"
 #include "base/budget.h"
 #include "base/error.h"
+#include "base/stopwatch.h"
 #include "base/text.h"
 #include "io/triangle_source.h"
 #include "methods/method_table.h"
@@ -229,14 +229,13 @@ void BuildVerb::summarise(const BuildReport& result, double seconds) const {
 }
 
 int BuildVerb::run(const RunContext& context) {
-    const auto start = std::chrono::steady_clock::now();
+    const Stopwatch watch;
     const BuildSettings build_settings = settings(context);
     const auto source = openSource(inputs_, build_settings.temp_dir);
     if (dry_run_) return dryRun(*source, build_settings);
     const BuildReport result =
         findMethod(method_)->build(*source, build_settings, context.progress);
-    const double seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double seconds = watch.seconds();
     summarise(result, seconds);
     writeReport(context.common.report,
                 report(result, build_settings, source->inputBytes(), seconds, context.progress),

@@ -42,6 +42,9 @@ public:
 private:
     Cut select(const ModelReader& model) const;
     CutRequest request(const Lattice& lattice) const;
+    template <class ExportTo>
+    ExportReport write(const ModelReader& model, uint64_t triangles, const RunContext& context,
+                       const ExportTo& export_to) const;
     ExportReport writeCut(const ModelReader& model, double& max_error, const RunContext& context);
     ExportReport writeAdaptive(const ModelReader& model, double& max_error,
                                const RunContext& context);
@@ -134,6 +137,18 @@ void warnAbout(bool below_finest, bool over_budget, double max_error, uint64_t t
             "the coarsest form has {} triangles, more than asked for: it is written", triangles));
 }
 
+/// export_to(writer) writes the mesh.
+template <class ExportTo>
+ExportReport ExtractVerb::write(const ModelReader& model, uint64_t triangles,
+                                const RunContext& context, const ExportTo& export_to) const {
+    const auto writer =
+        createMesh(output_, context.common.force, meshOutputOf(model.info(), triangles));
+    const ExportReport report = export_to(*writer);
+    context.progress.endStage();
+    for (const std::string& note : writer->notes()) logWarning(note);
+    return report;
+}
+
 ExportReport ExtractVerb::writeCut(const ModelReader& model, double& max_error,
                                    const RunContext& context) {
     const size_t in_flight = size_t(limits_.threads()) + 1;
@@ -141,14 +156,10 @@ ExportReport ExtractVerb::writeCut(const ModelReader& model, double& max_error,
     const Cut cut = select(model);
     max_error = cut.max_error * model.info().lattice.step;
     warnAbout(cut.below_finest, cut.over_budget, max_error, cut.triangles);
-    const auto writer =
-        createMesh(output_, context.common.force, meshOutputOf(model.info(), cut.triangles));
-    context.progress.beginStage("extract", exportSteps(cut));
-    const ExportReport report =
-        exportCut(model, cut, *writer, {tempDir(), in_flight}, budget, context.progress);
-    context.progress.endStage();
-    for (const std::string& note : writer->notes()) logWarning(note);
-    return report;
+    return write(model, cut.triangles, context, [&](MeshWriter& writer) {
+        context.progress.beginStage("extract", exportSteps(cut));
+        return exportCut(model, cut, writer, {tempDir(), in_flight}, budget, context.progress);
+    });
 }
 
 ExportReport ExtractVerb::writeAdaptive(const ModelReader& model, double& max_error,
@@ -159,14 +170,10 @@ ExportReport ExtractVerb::writeAdaptive(const ModelReader& model, double& max_er
     context.progress.beginStage("extract", 0);
     const MeshCut cut = adaptive->cut(request(model.info().lattice), budget);
     max_error = cut.max_error * model.info().lattice.step;
-    const uint64_t triangles = cut.mesh.triangleCount();
-    warnAbout(cut.below_finest, cut.over_budget, max_error, triangles);
-    const auto writer =
-        createMesh(output_, context.common.force, meshOutputOf(model.info(), triangles));
-    const ExportReport report = exportMesh(model.info(), cut.mesh, *writer, context.progress);
-    context.progress.endStage();
-    for (const std::string& note : writer->notes()) logWarning(note);
-    return report;
+    warnAbout(cut.below_finest, cut.over_budget, max_error, cut.mesh.triangleCount());
+    return write(model, cut.mesh.triangleCount(), context, [&](MeshWriter& writer) {
+        return exportMesh(model.info(), cut.mesh, writer, context.progress);
+    });
 }
 
 int ExtractVerb::run(const RunContext& context) {

@@ -42,12 +42,10 @@ VerbText ViewVerb::text() const {
         {"FILE... [options]"},
         {"Opens a window at once, and shows the models as finely as --pixels asks for. What has "
          "not been loaded yet is drawn coarser, without holes. A graphics card with OpenGL 4.5 "
-         "draws "
-         "where there is one, else the processor.",
+         "draws where there is one, else the processor.",
          "A mesh is offered to be built first: its model is put beside it, or into the user's "
-         "cache where that folder cannot be written. Files dropped on the window are added, meshes "
-         "built "
-         "in the background.",
+         "cache where that folder cannot be written. Files dropped on the window are added, "
+         "meshes built in the background.",
          "F1 in the window lists what mouse and keys do."},
         {{"look at a model", "pietra view moon.pietra"},
          {"two models in one scene, within 512 MB", "pietra view a.pietra b.pietra --ram 512M"}}};

@@ -1,9 +1,9 @@
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 
 #include "base/check.h"
+#include "base/stopwatch.h"
 #include "render/gl/context.h"
 #include "render/gl/renderer.h"
 #include "render/offline/batch_drawer.h"
@@ -68,11 +68,9 @@ public:
 private:
     template <class Body>
     void timed(const Body& body) {
-        using Clock = std::chrono::steady_clock;
-        const auto start = Clock::now();
+        const Stopwatch watch;
         thread_.run(body);
-        statistics_.draw_ms +=
-            std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+        statistics_.draw_ms += watch.ms();
     }
 
     void drawBatch() {

@@ -1,11 +1,11 @@
 #include "render/raster/rasteriser.h"
 
 #include <atomic>
-#include <chrono>
 #include <limits>
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "render/raster/batch.h"
 #include "render/raster/clip.h"
 #include "render/raster/coverage.h"
@@ -30,19 +30,6 @@ constexpr size_t kTilesPerThread = 8;
 size_t threadCount() {
     return tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
 }
-
-class Stopwatch {
-public:
-    double ms() {
-        const auto now = std::chrono::steady_clock::now();
-        const double ms = std::chrono::duration<double, std::milli>(now - began_).count();
-        began_ = now;
-        return ms;
-    }
-
-private:
-    std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
-};
 
 }  // namespace
 
@@ -144,7 +131,7 @@ void Rasteriser::State::drawBatch(bool leave_out_hidden) {
     parallelFor(batch.patch.size(), [&](size_t i) { transform(batch.patch[i]); });
     const std::vector<DrawChunk> chunks = makeChunks();
     drawn.assign(batch.patch.size(), !leave_out_hidden);
-    statistics.transform_ms += watch.ms();
+    statistics.transform_ms += watch.lapMs();
     drawTiles(chunks, leave_out_hidden);
     statistics.triangles += batch.triangles;
     statistics.patches += batch.patch.size();
@@ -268,12 +255,12 @@ void Rasteriser::State::drawTiles(const std::vector<DrawChunk>& chunks, bool lea
             drawUnhidden(chunks, tile, tiles[i].chunk);
         else
             for (const uint32_t chunk : tiles[i].chunk) drawChunk(chunks[chunk], tile);
-        raster_ns += int64_t(tile_watch.ms() * 1e6);
+        raster_ns += int64_t(tile_watch.lapMs() * 1e6);
         for (const uint32_t chunk : tiles[i].chunk)
             resolveChunk(tile, chunks[chunk], shader[chunks[chunk].patch->model], colour);
-        shade_ns += int64_t(tile_watch.ms() * 1e6);
+        shade_ns += int64_t(tile_watch.lapMs() * 1e6);
     });
-    const double wall = watch.ms(), busy = double(raster_ns + shade_ns);
+    const double wall = watch.lapMs(), busy = double(raster_ns + shade_ns);
     statistics.raster_ms += busy > 0 ? wall * double(raster_ns) / busy : wall;
     statistics.shade_ms += busy > 0 ? wall * double(shade_ns) / busy : 0;
 }
@@ -322,7 +309,7 @@ const Picture& Rasteriser::finish() {
     Stopwatch watch;
     s.statistics.pixels_covered =
         finishPicture(s.settings, s.samples, s.key, s.sample_colour, s.picture);
-    s.statistics.finish_ms += watch.ms();
+    s.statistics.finish_ms += watch.lapMs();
     s.finished = true;
     return s.picture;
 }
