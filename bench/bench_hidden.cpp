@@ -27,16 +27,19 @@ double median(std::vector<double> values) {
 struct Way {
     Rasteriser rasteriser;
     bool leave_out_hidden;
-    std::vector<double> ms, triangles;
+    std::vector<double> ms{}, triangles{}, transform{}, raster{}, shade{}, finish{};
 
     void draw(const std::vector<ModelPatches>& models) {
         const Stopwatch watch;
         rasteriser.restart(models[0].view, *models[0].lattice, {});
-        rasteriser.draw(models, leave_out_hidden);
-        rasteriser.finish();
+        rasteriser.drawAll(models, leave_out_hidden);
         ms.push_back(watch.ms());
-        triangles.push_back(
-            double(rasteriser.statistics().triangles - rasteriser.statistics().triangles_hidden));
+        const RasterStatistics& s = rasteriser.statistics();
+        triangles.push_back(double(s.triangles - s.triangles_hidden));
+        transform.push_back(s.transform_ms);
+        raster.push_back(s.raster_ms);
+        shade.push_back(s.shade_ms);
+        finish.push_back(s.finish_ms);
     }
 };
 
@@ -53,8 +56,8 @@ int main(int argc, char** argv) {
         standardPath(*parseStandardPath(argv[1]), coarseSurface(models), UpAxis::kZ, kSize);
     Scene scene(models, {size_t(2) << 30, 1});
     const View any({}, kSize, {});
-    Way way[2] = {{Rasteriser(any, {}, samples, {}), false, {}, {}},
-                  {Rasteriser(any, {}, samples, {}), true, {}, {}}};
+    Way way[2] = {{Rasteriser(any, {}, samples, {}), false},
+                  {Rasteriser(any, {}, samples, {}), true}};
     for (int i = 0; i < frames; ++i) {
         FrameRequest request;
         request.camera = path.frame(i, frames);
@@ -68,8 +71,11 @@ int main(int argc, char** argv) {
         for (int k = 0; k < 2; ++k) way[(i + k) % 2].draw(list);
         if (way[0].rasteriser.finish().colour != way[1].rasteriser.finish().colour) return 1;
     }
-    fmt::print(
-        "all {:.1f} ms, {:.0f} triangles; without hidden ones {:.1f} ms, {:.0f}; ratio {:.2f}\n",
-        median(way[0].ms), median(way[0].triangles), median(way[1].ms), median(way[1].triangles),
-        median(way[0].ms) / median(way[1].ms));
+    for (const Way& w : way)
+        fmt::print(
+            "{}: {:.1f} ms, {:.0f} triangles: transform {:.2f}, raster {:.2f}, shade {:.2f}, "
+            "finish {:.2f} ms\n",
+            w.leave_out_hidden ? "without hidden ones" : "all", median(w.ms), median(w.triangles),
+            median(w.transform), median(w.raster), median(w.shade), median(w.finish));
+    fmt::print("ratio {:.2f}\n", median(way[0].ms) / median(way[1].ms));
 }

@@ -16,8 +16,7 @@ public:
         else
             rasteriser_->restart(first.view, *first.lattice, settings.shade);
         samples_ = settings.samples;
-        rasteriser_->draw(models, settings.leave_out_hidden, settings.hidden);
-        picture_ = &rasteriser_->finish();
+        picture_ = &rasteriser_->drawAll(models, settings.leave_out_hidden, settings.hidden);
     }
     void wait() override {}
     const Picture& picture() override { return *picture_; }

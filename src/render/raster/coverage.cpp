@@ -102,7 +102,7 @@ void drawSample(const VisibilityTile& tile, const std::array<ScreenPoint, 3>& c,
         for (const Edge& e : edge) narrow(e.value(x, y) + e.bias, e.perPixel(), first, last);
         if (first > last) continue;
         const int64_t start = x + first * kSubpixel;
-        const size_t pixel = size_t(row) * size_t(tile.width) + size_t(box.x0 + first);
+        const size_t pixel = tile.at(int32_t(box.x0 + first), row);
         const Span span{tile.key + pixel * size_t(tile.samples) + size_t(sample),
                         last - first + 1,
                         tile.samples,

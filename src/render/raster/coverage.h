@@ -11,6 +11,7 @@
 #include <bit>
 #include <cstdint>
 
+#include "geometry/mesh.h"
 #include "render/raster/clip.h"
 
 namespace pietra {
@@ -29,13 +30,17 @@ inline constexpr uint32_t triangleNumber(VisibilityKey key) {
     return kMaxTriangleNumber - uint32_t(key);
 }
 
-/// Where a thread draws: one tile of the buffer.
+/// Where a thread draws: a rectangle of the picture, within a buffer that holds a larger one or all
+/// of it.
 struct VisibilityTile {
-    VisibilityKey*
-        key;  ///< of the whole buffer: sample s of pixel (x, y) is [(y*width + x)*samples + s]
-    int32_t width;  ///< of the picture, in pixels
-    int samples;    ///< 1 or 4
-    PixelBox box;   ///< nothing else is touched
+    VisibilityKey* key;       ///< of the buffer: sample s of pixel (x, y) is [at(x, y)*samples + s]
+    int32_t width;            ///< of the buffer, in pixels
+    int samples;              ///< 1 or 4
+    PixelBox box;             ///< nothing else is touched
+    Rgba8* colour = nullptr;  ///< of samples, laid out as the keys
+    int32_t origin = 0;       ///< -at(0, 0): of a buffer that does not begin there
+
+    size_t at(int32_t x, int32_t y) const { return size_t(int64_t(y) * width + x - origin); }
 };
 
 /// Extent in x and in y, in 1/256 pixel, up to which a triangle counts as small: its edge values

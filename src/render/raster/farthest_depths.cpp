@@ -24,10 +24,10 @@ PixelBox FarthestDepths::blocksOf(const PixelBox& box) {
 uint32_t FarthestDepths::look(int32_t x, int32_t y) const {
     const PixelBox box =
         PixelBox{x * kSide, y * kSide, (x + 1) * kSide, (y + 1) * kSide}.intersected(tile_.box);
-    const size_t samples = size_t(tile_.samples), row = size_t(tile_.width) * samples;
+    const auto samples = size_t(tile_.samples);
     VisibilityKey least = std::numeric_limits<VisibilityKey>::max();
     for (int32_t py = box.y0; py < box.y1; ++py) {
-        const VisibilityKey* key = tile_.key + size_t(py) * row + size_t(box.x0) * samples;
+        const VisibilityKey* key = tile_.key + tile_.at(box.x0, py) * samples;
         const VisibilityKey* end = key + size_t(box.x1 - box.x0) * samples;
         for (; key < end; ++key) least = std::min(least, *key);
     }

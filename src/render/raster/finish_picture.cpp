@@ -2,17 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <bit>
 #include <limits>
-
-#include "base/parallel.h"
 
 namespace pietra {
 namespace {
 
 constexpr float kNothing = std::numeric_limits<float>::infinity();
-constexpr size_t kRowGrain = 16;
 
 float depthOf(VisibilityKey key) {
     return 1 / std::bit_cast<float>(uint32_t(key >> 32));
@@ -36,6 +32,7 @@ private:
     const uint8_t* srgb_ = srgbTable();
 };
 
+/// Of columns x & 3, from that of the first pixel of a row.
 using Background = std::array<Rgba8, 4>;
 
 struct Row {
@@ -53,7 +50,7 @@ uint64_t finishRowOfOne(const Row& row, const Background& background) {
         const VisibilityKey key = row.key[x];
         const bool empty = key == 0;
         row.depth[x] = empty ? kNothing : depthOf(key);
-        row.colour[x] = empty ? background[x & 3] : row.colour[x];
+        row.colour[x] = empty ? background[x & 3] : row.sample_colour[x];
         row.key[x] = 0;
         covered += !empty;
     }
@@ -81,7 +78,39 @@ uint64_t finishRowOfFour(const Row& row, const Background& background, const Ave
     return covered;
 }
 
-/// Show::kDepth: light where it is near, with the range of the picture.
+Background backgroundFrom(const ShadeSettings& settings, const Picture& picture, int32_t x,
+                          int32_t y) {
+    Background background = backgroundRow(settings, y, picture.size.height);
+    std::rotate(background.begin(), background.begin() + (x & 3), background.end());
+    return background;
+}
+
+}  // namespace
+
+uint64_t finishTile(const ShadeSettings& settings, const VisibilityTile& tile, Picture& picture) {
+    const Averager averager;
+    const auto samples = size_t(tile.samples);
+    uint64_t covered = 0;
+    for (int32_t y = tile.box.y0; y < tile.box.y1; ++y) {
+        const Background background = backgroundFrom(settings, picture, tile.box.x0, y);
+        const size_t from = tile.at(tile.box.x0, y) * samples, to = picture.index(tile.box.x0, y);
+        const Row row{tile.key + from, tile.colour + from, picture.colour.data() + to,
+                      picture.depth.data() + to, size_t(tile.box.x1 - tile.box.x0)};
+        covered += samples == 1 ? finishRowOfOne(row, background)
+                                : finishRowOfFour(row, background, averager);
+    }
+    return covered;
+}
+
+void finishEmpty(const ShadeSettings& settings, const PixelBox& box, Picture& picture) {
+    for (int32_t y = box.y0; y < box.y1; ++y) {
+        const Background background = backgroundFrom(settings, picture, box.x0, y);
+        const size_t first = picture.index(box.x0, y), width = size_t(box.x1 - box.x0);
+        for (size_t x = 0; x < width; ++x) picture.colour[first + x] = background[x & 3];
+        std::fill_n(picture.depth.begin() + ptrdiff_t(first), width, kNothing);
+    }
+}
+
 void paintDepth(Picture& picture) {
     float nearest = kNothing, farthest = 0;
     for (const float depth : picture.depth)
@@ -96,30 +125,6 @@ void paintDepth(Picture& picture) {
         const auto grey = uint8_t((1 - (depth - nearest) * scale) * 255 + 0.5f);
         picture.colour[i] = {grey, grey, grey, 255};
     }
-}
-
-}  // namespace
-
-uint64_t finishPicture(const ShadeSettings& settings, int samples, std::vector<VisibilityKey>& key,
-                       const std::vector<Rgba8>& sample_colour, Picture& picture) {
-    const size_t width = size_t(picture.size.width);
-    const Averager averager;
-    std::atomic<uint64_t> covered{0};
-    parallelForSlices(size_t(picture.size.height), kRowGrain, [&](size_t begin, size_t end) {
-        uint64_t count = 0;
-        for (size_t y = begin; y < end; ++y) {
-            const size_t first = y * width;
-            const Background background = backgroundRow(settings, int(y), picture.size.height);
-            const Row row{key.data() + first * size_t(samples),
-                          samples == 1 ? nullptr : sample_colour.data() + 4 * first,
-                          picture.colour.data() + first, picture.depth.data() + first, width};
-            count += samples == 1 ? finishRowOfOne(row, background)
-                                  : finishRowOfFour(row, background, averager);
-        }
-        covered += count;
-    });
-    if (settings.show == Show::kDepth) paintDepth(picture);
-    return covered;
 }
 
 }  // namespace pietra

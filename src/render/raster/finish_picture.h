@@ -1,9 +1,8 @@
 #pragma once
-// The last step of a picture: samples become pixels, what is empty becomes background, keys become
-// depths, and the visibility buffer is left empty for the next picture.
+// The last step of a picture: samples become pixels, what is empty becomes background, and keys
+// become depths.
 
 #include <cstdint>
-#include <vector>
 
 #include "render/picture.h"
 #include "render/raster/coverage.h"
@@ -11,10 +10,14 @@
 
 namespace pietra {
 
-/// `sample_colour` holds four colours a pixel where `samples` is 4, and is not read where it is 1:
-/// the colours are then in `picture` already. Samples are averaged in linear light; the depth is
+/// The pixels of the tile's box, from its keys, which are 0 then, and its colours; these may be the
+/// picture's own where a pixel has one sample. Samples are averaged in linear light; the depth is
 /// that of the nearest one. Returns how many pixels are covered.
-uint64_t finishPicture(const ShadeSettings& settings, int samples, std::vector<VisibilityKey>& key,
-                       const std::vector<Rgba8>& sample_colour, Picture& picture);
+uint64_t finishTile(const ShadeSettings& settings, const VisibilityTile& tile, Picture& picture);
+/// Where nothing was drawn.
+void finishEmpty(const ShadeSettings& settings, const PixelBox& box, Picture& picture);
+
+/// Show::kDepth, when all else is done: light where it is near, with the range of the picture.
+void paintDepth(Picture& picture);
 
 }  // namespace pietra

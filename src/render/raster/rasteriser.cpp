@@ -1,5 +1,7 @@
 #include "render/raster/rasteriser.h"
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <atomic>
 #include <limits>
 
@@ -26,6 +28,7 @@ constexpr size_t kChunkTriangles = 4096;
 constexpr size_t kBatchVertices = size_t(1) << 20;
 /// More tiles than threads, so that none waits long for the last one.
 constexpr size_t kTilesPerThread = 8;
+constexpr size_t kRowGrain = 16;
 
 size_t threadCount() {
     return tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
@@ -37,9 +40,15 @@ struct Rasteriser::State {
     BatchModel model;  // of what is drawn now
     ShadeSettings settings;
     int samples;
-    std::vector<VisibilityKey> key;
-    bool finished = false;             // the keys are then all zero again
-    std::vector<Rgba8> sample_colour;  // with 4 samples; with 1 it is the picture's
+    /// Samples of a rectangle, all zero before and after it is drawn.
+    struct Samples {
+        std::vector<VisibilityKey> key;
+        std::vector<Rgba8> colour;
+    };
+    Samples whole;  // of the picture; the colours of single samples are in the picture
+    tbb::enumerable_thread_specific<Samples> own;  // of the tile that a thread draws
+    bool is_begun = false;                         // something is in `whole`
+    bool finished = false;
     Picture picture;
     Batch batch;
     std::vector<uint8_t> drawn;  // a patch of the batch: not left out, set by any thread
@@ -51,11 +60,13 @@ struct Rasteriser::State {
         CHECK(samples == 1 || samples == 4);
     }
     void begin();
+    void setModel(const View& view, const Lattice& lattice);
     PixelBox screen() const { return {0, 0, picture.size.width, picture.size.height}; }
     void checkScalars(const Mesh& mesh) const;
     void beginBatch();
     void draw(std::span<const DrawPatch> patches, bool leave_out_hidden);
-    void drawBatch(bool leave_out_hidden);
+    void draw(std::span<const ModelPatches> models, bool leave_out_hidden);
+    void drawBatch(bool leave_out_hidden, bool is_all = false);
     void layOutVertices();
     void transform(BatchPatch& patch) const;
     std::vector<DrawChunk> makeChunks() const;
@@ -63,7 +74,12 @@ struct Rasteriser::State {
     void drawChunk(const DrawChunk& chunk, const VisibilityTile& tile) const;
     void drawUnhidden(const std::vector<DrawChunk>& chunks, const VisibilityTile& tile,
                       std::vector<uint32_t>& list);
-    void drawTiles(const std::vector<DrawChunk>& chunks, bool leave_out_hidden);
+    void beginWhole();
+    void finishWhole();
+    void complete(uint64_t pixels_covered);
+    VisibilityTile tileOfWhole(const PixelBox& box);
+    VisibilityTile ownTile(const PixelBox& box);
+    void drawTiles(const std::vector<DrawChunk>& chunks, bool leave_out_hidden, bool is_all);
 };
 
 void Rasteriser::State::begin() {
@@ -73,11 +89,14 @@ void Rasteriser::State::begin() {
     const size_t pixels = picture.pixelCount();
     picture.colour.resize(pixels);
     picture.depth.resize(pixels);
-    const size_t keys = pixels * size_t(samples);
-    if (key.size() != keys || !finished) key.assign(keys, 0);
-    finished = false;
-    if (samples > 1) sample_colour.resize(pixels * size_t(samples));
+    if (is_begun && !finished) whole = {};
+    is_begun = finished = false;
     statistics = {};
+}
+
+void Rasteriser::State::setModel(const View& view, const Lattice& lattice) {
+    CHECK(view.size().width == picture.size.width && view.size().height == picture.size.height);
+    model = {view, Projection(view, lattice)};
 }
 
 void Rasteriser::State::checkScalars(const Mesh& mesh) const {
@@ -125,14 +144,23 @@ void Rasteriser::State::layOutVertices() {
     }
 }
 
-void Rasteriser::State::drawBatch(bool leave_out_hidden) {
+void Rasteriser::State::draw(std::span<const ModelPatches> models, bool leave_out_hidden) {
+    beginBatch();
+    for (const ModelPatches& m : models) {
+        setModel(m.view, *m.lattice);
+        draw(m.patches, leave_out_hidden);
+    }
+}
+
+/// `is_all`: of the picture.
+void Rasteriser::State::drawBatch(bool leave_out_hidden, bool is_all) {
     Stopwatch watch;
     layOutVertices();
     parallelFor(batch.patch.size(), [&](size_t i) { transform(batch.patch[i]); });
     const std::vector<DrawChunk> chunks = makeChunks();
     drawn.assign(batch.patch.size(), !leave_out_hidden);
     statistics.transform_ms += watch.lapMs();
-    drawTiles(chunks, leave_out_hidden);
+    drawTiles(chunks, leave_out_hidden, is_all);
     statistics.triangles += batch.triangles;
     statistics.patches += batch.patch.size();
     for (size_t i = 0; i < drawn.size(); ++i)
@@ -241,28 +269,84 @@ void Rasteriser::State::drawUnhidden(const std::vector<DrawChunk>& chunks,
     list.erase(kept, list.end());
 }
 
-void Rasteriser::State::drawTiles(const std::vector<DrawChunk>& chunks, bool leave_out_hidden) {
-    std::vector<DrawTile> tiles = makeTiles(chunks, screen(), kTilesPerThread * threadCount());
+VisibilityTile Rasteriser::State::tileOfWhole(const PixelBox& box) {
+    return {whole.key.data(), picture.size.width, samples, box,
+            samples == 1 ? picture.colour.data() : whole.colour.data()};
+}
+
+VisibilityTile Rasteriser::State::ownTile(const PixelBox& box) {
+    Samples& s = own.local();
+    const int32_t width = box.x1 - box.x0;
+    const size_t count = size_t(width) * size_t(box.y1 - box.y0) * size_t(samples);
+    if (s.key.size() < count) {
+        s.key.resize(count);
+        s.colour.resize(count);
+    }
+    return {s.key.data(), width, samples, box, s.colour.data(), box.y0 * width + box.x0};
+}
+
+/// `is_all`: of the picture, which is finished then.
+void Rasteriser::State::drawTiles(const std::vector<DrawChunk>& chunks, bool leave_out_hidden,
+                                  bool is_all) {
+    Tiling tiling = makeTiles(chunks, screen(), kTilesPerThread * threadCount());
+    std::vector<DrawTile>& tiles = tiling.tiles;
     std::vector<PixelShader> shader;
     for (const BatchModel& m : batch.model) shader.emplace_back(m.view, m.projection, settings);
-    Rgba8* colour = samples == 1 ? picture.colour.data() : sample_colour.data();
-    std::atomic<int64_t> raster_ns{0}, shade_ns{0};
+    if (!is_all && !is_begun) beginWhole();
+    std::atomic<int64_t> raster_ns{0}, shade_ns{0}, finish_ns{0};
+    std::atomic<uint64_t> covered{0};
     Stopwatch watch;
-    parallelFor(tiles.size(), [&](size_t i) {
+    const auto drawTile = [&](DrawTile& piece) {
         Stopwatch tile_watch;
-        const VisibilityTile tile{key.data(), picture.size.width, samples, tiles[i].box};
+        const VisibilityTile tile = is_all ? ownTile(piece.box) : tileOfWhole(piece.box);
         if (leave_out_hidden)
-            drawUnhidden(chunks, tile, tiles[i].chunk);
+            drawUnhidden(chunks, tile, piece.chunk);
         else
-            for (const uint32_t chunk : tiles[i].chunk) drawChunk(chunks[chunk], tile);
+            for (const uint32_t chunk : piece.chunk) drawChunk(chunks[chunk], tile);
         raster_ns += int64_t(tile_watch.lapMs() * 1e6);
-        for (const uint32_t chunk : tiles[i].chunk)
-            resolveChunk(tile, chunks[chunk], shader[chunks[chunk].patch->model], colour);
+        for (const uint32_t chunk : piece.chunk)
+            resolveChunk(tile, chunks[chunk], shader[chunks[chunk].patch->model]);
         shade_ns += int64_t(tile_watch.lapMs() * 1e6);
+        if (is_all) covered += finishTile(settings, tile, picture);
+        finish_ns += int64_t(tile_watch.lapMs() * 1e6);
+    };
+    parallelFor(tiles.size() + (is_all ? tiling.empty.size() : 0), [&](size_t i) {
+        if (i < tiles.size())
+            drawTile(tiles[i]);
+        else
+            finishEmpty(settings, tiling.empty[i - tiles.size()], picture);
     });
-    const double wall = watch.lapMs(), busy = double(raster_ns + shade_ns);
-    statistics.raster_ms += busy > 0 ? wall * double(raster_ns) / busy : wall;
-    statistics.shade_ms += busy > 0 ? wall * double(shade_ns) / busy : 0;
+    if (is_all) complete(covered);
+    const double wall = watch.lapMs(), busy = double(raster_ns + shade_ns + finish_ns);
+    const auto share = [&](int64_t ns) { return busy > 0 ? wall * double(ns) / busy : 0; };
+    statistics.raster_ms += share(raster_ns);
+    statistics.shade_ms += share(shade_ns);
+    statistics.finish_ms += share(finish_ns);
+}
+
+void Rasteriser::State::beginWhole() {
+    const size_t count = picture.pixelCount() * size_t(samples);
+    if (whole.key.size() != count) whole.key.assign(count, 0);
+    if (samples > 1) whole.colour.resize(count);
+    is_begun = true;
+}
+
+void Rasteriser::State::finishWhole() {
+    if (!is_begun) beginWhole();
+    Stopwatch watch;
+    std::atomic<uint64_t> covered{0};
+    parallelForSlices(size_t(picture.size.height), kRowGrain, [&](size_t begin, size_t end) {
+        const PixelBox rows{0, int32_t(begin), picture.size.width, int32_t(end)};
+        covered += finishTile(settings, tileOfWhole(rows), picture);
+    });
+    complete(covered);
+    statistics.finish_ms += watch.lapMs();
+}
+
+void Rasteriser::State::complete(uint64_t pixels_covered) {
+    if (settings.show == Show::kDepth) paintDepth(picture);
+    statistics.pixels_covered = pixels_covered;
+    finished = true;
 }
 
 Rasteriser::Rasteriser(const View& view, const Lattice& lattice, int samples,
@@ -280,9 +364,7 @@ void Rasteriser::restart(const View& view, const Lattice& lattice, const ShadeSe
 }
 
 void Rasteriser::setModel(const View& view, const Lattice& lattice) {
-    CHECK(view.size().width == state_->picture.size.width &&
-          view.size().height == state_->picture.size.height);
-    state_->model = {view, Projection(view, lattice)};
+    state_->setModel(view, lattice);
 }
 
 void Rasteriser::draw(std::span<const DrawPatch> patches) {
@@ -291,26 +373,25 @@ void Rasteriser::draw(std::span<const DrawPatch> patches) {
     state_->drawBatch(false);
 }
 
-void Rasteriser::draw(std::span<const ModelPatches> models, bool leave_out_hidden,
-                      std::vector<uint32_t>* hidden) {
-    state_->hidden = hidden;
-    state_->beginBatch();
-    for (const ModelPatches& m : models) {
-        setModel(m.view, *m.lattice);
-        state_->draw(m.patches, leave_out_hidden);
-    }
+void Rasteriser::draw(std::span<const ModelPatches> models, bool leave_out_hidden) {
+    state_->draw(models, leave_out_hidden);
     state_->drawBatch(leave_out_hidden);
-    state_->hidden = nullptr;
+}
+
+const Picture& Rasteriser::drawAll(std::span<const ModelPatches> models, bool leave_out_hidden,
+                                   std::vector<uint32_t>* hidden) {
+    State& s = *state_;
+    CHECK(!s.is_begun);
+    s.hidden = hidden;
+    s.draw(models, leave_out_hidden);
+    s.drawBatch(leave_out_hidden, !s.is_begun);
+    s.hidden = nullptr;
+    return finish();
 }
 
 const Picture& Rasteriser::finish() {
     State& s = *state_;
-    if (s.finished) return s.picture;
-    Stopwatch watch;
-    s.statistics.pixels_covered =
-        finishPicture(s.settings, s.samples, s.key, s.sample_colour, s.picture);
-    s.statistics.finish_ms += watch.lapMs();
-    s.finished = true;
+    if (!s.finished) s.finishWhole();
     return s.picture;
 }
 

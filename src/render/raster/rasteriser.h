@@ -13,8 +13,9 @@
 // Determinism: the picture does not depend on the number of threads, the SIMD level, how the draw
 // list was cut into calls, or whether what is hidden was left out.
 //
-// Memory: 16 bytes a pixel (56 with 4 samples), and 16 a vertex of what is drawn at once: a
-// million, or those of the largest mesh. Not thread-safe: one thread calls, many work.
+// Memory: 16 bytes a pixel (56 with 4 samples; 8 for what drawAll() draws at once), and 16 a vertex
+// of what is drawn at once: a million, or those of the largest mesh. Not thread-safe: one thread
+// calls, many work.
 
 #include <cstdint>
 #include <memory>
@@ -33,8 +34,8 @@ struct RasterStatistics {
     uint64_t triangles = 0;         ///< in them
     uint64_t triangles_hidden = 0;  ///< of these, left out; depends on the number of threads
     uint64_t pixels_covered = 0;    ///< with anything in them; set by finish()
-    /// Wall clock. Rasterising and shading run in one parallel loop, whose time is split as the
-    /// threads spent it.
+    /// Wall clock. Rasterising and shading, in drawAll() finishing too, run in one parallel loop,
+    /// whose time is split as the threads spent it.
     double transform_ms = 0, raster_ms = 0, shade_ms = 0, finish_ms = 0;
     double totalMs() const { return transform_ms + raster_ms + shade_ms + finish_ms; }
 };
@@ -69,9 +70,13 @@ public:
     void draw(std::span<const DrawPatch> patches);
     /// Draws the models as one after the other; the last one stays set. Patches that are hidden, by
     /// what is drawn already or by each other, may be left out: this changes no pixel, and costs
-    /// next to nothing where none are. Appends the ids of those left out to `hidden`.
-    void draw(std::span<const ModelPatches> models, bool leave_out_hidden,
-              std::vector<uint32_t>* hidden = nullptr);
+    /// next to nothing where none are.
+    void draw(std::span<const ModelPatches> models, bool leave_out_hidden);
+    /// The same, as all of the picture: nothing was drawn since it began. Faster than to draw and
+    /// finish, as a tile's samples stay in a cache until its pixels are made. Appends the ids of
+    /// patches that were left out to `hidden`.
+    const Picture& drawAll(std::span<const ModelPatches> models, bool leave_out_hidden,
+                           std::vector<uint32_t>* hidden = nullptr);
     /// Completes the picture, which is valid until restart(); nothing can be drawn in between.
     const Picture& finish();
 

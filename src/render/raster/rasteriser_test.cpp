@@ -264,6 +264,29 @@ TEST(Picture, DoesNotDependOnHowTheListIsCutIntoCalls) {
     }
 }
 
+TEST(Picture, DrawnAllAtOnceIsTheSame) {
+    const Scene scene;
+    const Lattice lattice;
+    for (const int samples : {1, 4})
+        for (const Show show : {Show::kShaded, Show::kDepth})
+            for (const size_t count : {scene.patches.size(), size_t(1), size_t(0)}) {
+                ShadeSettings settings;
+                settings.show = show;
+                const std::span patches = std::span(scene.patches).first(count);
+                const ModelPatches model{scene.view, &lattice, patches};
+                Rasteriser rasteriser(scene.view, lattice, samples, settings);
+                rasteriser.draw(patches);
+                const Picture expected = rasteriser.finish();
+                const uint64_t covered = rasteriser.statistics().pixels_covered;
+                for (const bool leave_out_hidden : {false, true, false}) {
+                    rasteriser.restart(scene.view, lattice, settings);
+                    const std::string name = std::to_string(samples) + std::to_string(count);
+                    expectSame(rasteriser.drawAll({&model, 1}, leave_out_hidden), expected, name);
+                    EXPECT_EQ(rasteriser.statistics().pixels_covered, covered);
+                }
+            }
+}
+
 TEST(Picture, DoesNotDependOnHowManyBatchesAListTakes) {
     const Scene scene;
     const Picture expected = render(scene.view, scene.patches, 1);
@@ -280,6 +303,8 @@ TEST(Picture, DoesNotDependOnHowManyBatchesAListTakes) {
         Rasteriser rasteriser(scene.view, lattice, 1, {});
         rasteriser.draw(models, leave_out_hidden);
         expectSame(rasteriser.finish(), expected, std::to_string(leave_out_hidden));
+        rasteriser.restart(scene.view, lattice, {});
+        expectSame(rasteriser.drawAll(models, leave_out_hidden), expected, "at once");
         EXPECT_EQ(rasteriser.statistics().patches, again.size() + scene.patches.size());
     }
 }

@@ -24,9 +24,8 @@ private:
 /// A buffer of items that shades them as many at a time as the shader takes.
 class Collector {
 public:
-    Collector(const BatchPatch& patch, const PixelShader& shader, const VisibilityTile& tile,
-              Rgba8* colour)
-        : patch_(patch), shader_(shader), tile_(tile), colour_(colour) {}
+    Collector(const BatchPatch& patch, const PixelShader& shader, const VisibilityTile& tile)
+        : patch_(patch), shader_(shader), tile_(tile) {}
     ~Collector() { flush(true); }
 
     /// Where to put up to `count` more items; taken() then says up to where there are some.
@@ -48,20 +47,19 @@ private:
         count_ -= done;
     }
     void put(const ShadeItem& item, const Rgba8& colour) {
-        const size_t pixel = size_t(item.y()) * size_t(tile_.width) + size_t(item.x());
+        const size_t pixel = tile_.at(item.x(), item.y());
         if (tile_.samples == 1) {
-            colour_[pixel] = colour;
+            tile_.colour[pixel] = colour;
             return;
         }
         const uint32_t mask = item.sampleMask();
         for (size_t s = 0; s < 4; ++s)
-            if (mask >> s & 1) colour_[4 * pixel + s] = colour;
+            if (mask >> s & 1) tile_.colour[4 * pixel + s] = colour;
     }
 
     const BatchPatch& patch_;
     const PixelShader& shader_;
     const VisibilityTile& tile_;
-    Rgba8* colour_;
     size_t count_ = 0;
     ShadeItem item_[kCapacity];
 };
@@ -71,16 +69,15 @@ constexpr int32_t kRun = 64;  // pixels between two checks for room
 void collectOne(const VisibilityTile& tile, const DrawChunk& chunk, Collector& collector, int32_t y,
                 int32_t x0, int32_t x1) {
     const KeyRange range(chunk);
-    const size_t row = size_t(y) * size_t(tile.width);
+    VisibilityKey* keys = tile.key + tile.at(x0, y);
     ShadeItem* item = collector.room(kRun);
-    for (int32_t x = x0; x < x1; ++x) {
-        const size_t pixel = row + size_t(x);
-        const VisibilityKey key = tile.key[pixel];
+    for (int32_t x = x0; x < x1; ++x, ++keys) {
+        const VisibilityKey key = *keys;
         const bool mine = range.holds(key);
         // Counts only if it is the chunk's: without a branch, as that is anyone's guess.
         *item = ShadeItem::at(range.triangle(key, chunk), x, y, 1);
         item += mine;
-        tile.key[pixel] = mine ? key | kResolved : key;
+        *keys = mine ? key | kResolved : key;
     }
     collector.taken(item);
 }
@@ -89,11 +86,9 @@ void collectOne(const VisibilityTile& tile, const DrawChunk& chunk, Collector& c
 void collectFour(const VisibilityTile& tile, const DrawChunk& chunk, Collector& collector,
                  int32_t y, int32_t x0, int32_t x1) {
     const KeyRange range(chunk);
-    const size_t row = size_t(y) * size_t(tile.width);
+    VisibilityKey* key = tile.key + 4 * tile.at(x0, y);
     ShadeItem* item = collector.room(4 * kRun);
-    for (int32_t x = x0; x < x1; ++x) {
-        const size_t pixel = row + size_t(x);
-        VisibilityKey* key = tile.key + 4 * pixel;
+    for (int32_t x = x0; x < x1; ++x, key += 4) {
         uint32_t left = 0;
         for (int s = 0; s < 4; ++s) left |= uint32_t(range.holds(key[s])) << s;
         if (left == 0) continue;
@@ -113,17 +108,16 @@ void collectFour(const VisibilityTile& tile, const DrawChunk& chunk, Collector& 
 
 }  // namespace
 
-void resolveChunk(const VisibilityTile& tile, const DrawChunk& chunk, const PixelShader& shader,
-                  Rgba8* colour) {
-    Collector collector(*chunk.patch, shader, tile, colour);
+void resolveChunk(const VisibilityTile& tile, const DrawChunk& chunk, const PixelShader& shader) {
+    Collector collector(*chunk.patch, shader, tile);
     const PixelBox box = tile.box.intersected(chunk.box);
     const BatchPatch& patch = *chunk.patch;
     prefetchBytes(patch.triangle() + chunk.first, chunk.count * sizeof(Triangle));
     prefetchBytes(patch.vertex, patch.mesh().vertexCount() * sizeof(ScreenVertex));
     const size_t row_bytes = size_t(box.x1 - box.x0) * size_t(tile.samples) * sizeof(VisibilityKey);
     for (int32_t y = box.y0; y < box.y1; ++y) {
-        const size_t below = size_t(y + 1) * size_t(tile.width) + size_t(box.x0);
-        if (y + 1 < box.y1) prefetchBytes(tile.key + below * size_t(tile.samples), row_bytes);
+        if (y + 1 < box.y1)
+            prefetchBytes(tile.key + tile.at(box.x0, y + 1) * size_t(tile.samples), row_bytes);
         for (int32_t x = box.x0; x < box.x1; x += kRun) {
             const int32_t end = std::min(x + kRun, box.x1);
             if (tile.samples == 1)

@@ -7,9 +7,7 @@
 
 namespace pietra {
 
-/// `colour`: one a sample, laid out as the tile's keys. Only samples within the tile's box are
-/// touched.
-void resolveChunk(const VisibilityTile& tile, const DrawChunk& chunk, const PixelShader& shader,
-                  Rgba8* colour);
+/// Only samples within the tile's box are touched.
+void resolveChunk(const VisibilityTile& tile, const DrawChunk& chunk, const PixelShader& shader);
 
 }  // namespace pietra

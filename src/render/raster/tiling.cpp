@@ -1,6 +1,7 @@
 #include "render/raster/tiling.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 namespace pietra {
@@ -21,6 +22,15 @@ uint64_t area(const PixelBox& box) {
 uint64_t workIn(const DrawChunk& chunk, const PixelBox& box) {
     const uint64_t part = area(chunk.box.intersected(box)), whole = area(chunk.box);
     return uint64_t(chunk.count) * part / whole + part / kPixelsPerTriangle;
+}
+
+/// What is left of a box beside one within it.
+void addMargins(const PixelBox& box, const PixelBox& inner, std::vector<PixelBox>& margins) {
+    for (const PixelBox& margin :
+         {PixelBox{box.x0, box.y0, box.x1, inner.y0}, PixelBox{box.x0, inner.y1, box.x1, box.y1},
+          PixelBox{box.x0, inner.y0, inner.x0, inner.y1},
+          PixelBox{inner.x1, inner.y0, box.x1, inner.y1}})
+        if (!margin.empty()) margins.push_back(margin);
 }
 
 class Cutter {
@@ -47,18 +57,23 @@ public:
         return sum;
     }
 
-    /// Halves the work across the longer side; false if the tile is too small.
-    bool cut(const DrawTile& tile, DrawTile& low, DrawTile& high) const {
+    struct Halves {
+        PixelBox low_box, high_box;
+        DrawTile low, high;  ///< what of these has chunks
+    };
+    /// Halves the work across the longer side; nothing if the tile is too small.
+    std::optional<Halves> cut(const DrawTile& tile) const {
         const bool across_x = tile.box.x1 - tile.box.x0 > tile.box.y1 - tile.box.y0;
         const int32_t at = across_x ? cutPosition(tile, &PixelBox::x0, &PixelBox::x1)
                                     : cutPosition(tile, &PixelBox::y0, &PixelBox::y1);
-        PixelBox low_box = tile.box, high_box = tile.box;
-        (across_x ? low_box.x1 : low_box.y1) = at;
-        (across_x ? high_box.x0 : high_box.y0) = at;
-        if (low_box.empty() || high_box.empty()) return false;
-        low = makeTile(low_box, tile.chunk);
-        high = makeTile(high_box, tile.chunk);
-        return !low.chunk.empty() && !high.chunk.empty();
+        Halves halves{tile.box, tile.box, {}, {}};
+        (across_x ? halves.low_box.x1 : halves.low_box.y1) = at;
+        (across_x ? halves.high_box.x0 : halves.high_box.y0) = at;
+        if (halves.low_box.empty() || halves.high_box.empty()) return {};
+        halves.low = makeTile(halves.low_box, tile.chunk);
+        halves.high = makeTile(halves.high_box, tile.chunk);
+        if (halves.low.chunk.empty() || halves.high.chunk.empty()) return {};
+        return halves;
     }
 
 private:
@@ -91,9 +106,9 @@ private:
 
 }  // namespace
 
-std::vector<DrawTile> makeTiles(std::span<const DrawChunk> chunks, const PixelBox& screen,
-                                size_t tiles) {
+Tiling makeTiles(std::span<const DrawChunk> chunks, const PixelBox& screen, size_t tiles) {
     const Cutter cutter(chunks);
+    Tiling tiling;
     std::vector<uint32_t> all(chunks.size());
     for (size_t i = 0; i < all.size(); ++i) all[i] = uint32_t(i);
     struct Entry {
@@ -103,29 +118,30 @@ std::vector<DrawTile> makeTiles(std::span<const DrawChunk> chunks, const PixelBo
     };
     // A heap with the costliest tile on top: cut it until there are enough.
     std::vector<Entry> heap;
-    const auto add = [&](DrawTile tile) {
+    const auto add = [&](DrawTile tile, const PixelBox& around) {
+        addMargins(around, tile.box, tiling.empty);
         const uint64_t work = cutter.work(tile);
         heap.push_back({work, std::move(tile)});
         std::push_heap(heap.begin(), heap.end());
     };
     DrawTile whole = cutter.makeTile(screen, all);
-    if (whole.chunk.empty()) return {};
-    add(std::move(whole));
-    std::vector<DrawTile> done;  // cannot be cut
+    if (whole.chunk.empty()) return {{}, {screen}};
+    add(std::move(whole), screen);
+    std::vector<DrawTile>& done = tiling.tiles;  // cannot be cut
     while (!heap.empty() && heap.size() + done.size() < tiles && heap.front().work > kMinWork) {
         std::pop_heap(heap.begin(), heap.end());
-        DrawTile low, high, tile = std::move(heap.back().tile);
+        const DrawTile tile = std::move(heap.back().tile);
         heap.pop_back();
-        if (cutter.cut(tile, low, high)) {
-            add(std::move(low));
-            add(std::move(high));
+        if (auto halves = cutter.cut(tile)) {
+            add(std::move(halves->low), halves->low_box);
+            add(std::move(halves->high), halves->high_box);
         } else {
             done.push_back(std::move(tile));
         }
     }
     std::sort(heap.rbegin(), heap.rend());
     for (Entry& entry : heap) done.push_back(std::move(entry.tile));
-    return done;
+    return tiling;
 }
 
 }  // namespace pietra

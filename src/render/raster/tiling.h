@@ -16,8 +16,13 @@ struct DrawTile {
     std::vector<uint32_t> chunk;  ///< touching the tile, ascending
 };
 
-/// Disjoint tiles that together hold all chunks' boxes, at most `tiles` of them; costly ones first.
-std::vector<DrawTile> makeTiles(std::span<const DrawChunk> chunks, const PixelBox& screen,
-                                size_t tiles);
+/// What a picture is cut into: disjoint, and together all of it.
+struct Tiling {
+    std::vector<DrawTile> tiles;  ///< costly ones first
+    std::vector<PixelBox> empty;  ///< that no chunk touches
+};
+
+/// At most so many tiles.
+Tiling makeTiles(std::span<const DrawChunk> chunks, const PixelBox& screen, size_t tiles);
 
 }  // namespace pietra

@@ -22,26 +22,31 @@ std::vector<DrawChunk> randomChunks(std::mt19937& random, size_t count, int larg
     return chunks;
 }
 
-TEST(Tiling, TilesAreDisjointAndHoldEveryPartOfEveryChunk) {
+TEST(Tiling, PiecesAreDisjointAndTilesHoldEveryPartOfEveryChunk) {
     std::mt19937 random(1);
     for (const size_t count : {1u, 7u, 200u})
         for (const int largest : {1, 20, 300})
             for (const size_t wanted : {1u, 2u, 8u, 50u}) {
                 const std::vector<DrawChunk> chunks = randomChunks(random, count, largest);
-                const std::vector<DrawTile> tiles = makeTiles(chunks, kScreen, wanted);
+                const Tiling tiling = makeTiles(chunks, kScreen, wanted);
+                const std::vector<DrawTile>& tiles = tiling.tiles;
                 EXPECT_LE(tiles.size(), wanted);
                 std::vector<int> owner(300 * 200, -1);
-                for (size_t t = 0; t < tiles.size(); ++t)
-                    for (int y = tiles[t].box.y0; y < tiles[t].box.y1; ++y)
-                        for (int x = tiles[t].box.x0; x < tiles[t].box.x1; ++x) {
+                const auto own = [&](const PixelBox& box, int t) {
+                    for (int y = box.y0; y < box.y1; ++y)
+                        for (int x = box.x0; x < box.x1; ++x) {
                             ASSERT_EQ(owner[y * 300 + x], -1);
-                            owner[y * 300 + x] = int(t);
+                            owner[y * 300 + x] = t;
                         }
+                };
+                for (size_t t = 0; t < tiles.size(); ++t) own(tiles[t].box, int(t));
+                for (const PixelBox& box : tiling.empty) own(box, int(tiles.size()));
+                EXPECT_TRUE(std::find(owner.begin(), owner.end(), -1) == owner.end());
                 for (uint32_t i = 0; i < chunks.size(); ++i)
                     for (int y = chunks[i].box.y0; y < chunks[i].box.y1; ++y)
                         for (int x = chunks[i].box.x0; x < chunks[i].box.x1; ++x) {
                             const int t = owner[y * 300 + x];
-                            ASSERT_GE(t, 0);
+                            ASSERT_LT(t, int(tiles.size()));
                             const std::vector<uint32_t>& listed = tiles[t].chunk;
                             ASSERT_TRUE(std::binary_search(listed.begin(), listed.end(), i));
                         }
@@ -51,13 +56,13 @@ TEST(Tiling, TilesAreDisjointAndHoldEveryPartOfEveryChunk) {
 TEST(Tiling, WorkIsShared) {
     std::mt19937 random(2);
     const std::vector<DrawChunk> chunks = randomChunks(random, 3000, 10);
-    const std::vector<DrawTile> tiles = makeTiles(chunks, kScreen, 8);
+    const std::vector<DrawTile> tiles = makeTiles(chunks, kScreen, 8).tiles;
     EXPECT_EQ(tiles.size(), 8u);
     for (const DrawTile& tile : tiles) {
         EXPECT_GT(tile.chunk.size(), 200u);
         EXPECT_LT(tile.chunk.size(), 700u);
     }
-    EXPECT_TRUE(makeTiles({}, kScreen, 8).empty());
+    EXPECT_TRUE(makeTiles({}, kScreen, 8).tiles.empty());
 }
 
 }  // namespace

@@ -22,10 +22,6 @@ using VU = hn::Vec<DU>;
 using VF = hn::Vec<DF>;
 using MI = hn::Mask<DI>;
 
-/// Pixels of one row, for triangles larger than 2 x 2.
-using RI = hn::CappedTag<int32_t, 8>;
-using RF = hn::CappedTag<float, 8>;
-
 template <class D>
 HWY_INLINE uint32_t bitsOf(D d, hn::Mask<D> mask) {
     uint8_t bytes[8] = {};
@@ -89,12 +85,15 @@ private:
     }
 };
 
-/// One triangle taken out of its lane, for the row loop.
-struct SmallTriangle {
-    int32_t x[3], y[3];
-    float depth[3];
-    int32_t area;
-    uint32_t low;
+/// What one sample position shares: coordinates from that sample of the pixel (x0, y0) of each
+/// lane.
+struct Sampled {
+    VI x0, y0;      ///< first pixel within triangle and tile
+    VI wide, high;  ///< how many more there are
+    LaneEdge edge[3];
+    VI value[3];    ///< of the edges, at the origin
+    VF d0, d1, d2;  ///< depth and its differences
+    VF inv_area, nearest, farthest;
 };
 
 template <int kSamples>
@@ -212,154 +211,160 @@ private:
                  x1 = last(g.max_x, before_x, tile_.box.x1);
         const VI y0 = first(g.min_y, before_y, tile_.box.y0),
                  y1 = last(g.max_y, before_y, tile_.box.y1);
-        const VI wide = hn::Sub(x1, x0), high = hn::Sub(y1, y0), one = hn::Set(di, 1);
+        const VI wide = hn::Sub(x1, x0), high = hn::Sub(y1, y0);
         const MI hit = hn::And(g.drawn, hn::Gt(hn::Min(wide, high), hn::Set(di, -1)));
         if (hn::AllFalse(di, hit)) return;
         const MI tiny = hn::And(hit, hn::Lt(hn::Max(wide, high), hn::Set(di, 2)));
-        drawTiny(g, tiny, x0, y0, hn::Eq(wide, one), hn::Eq(high, one), sample);
-        const MI more = hn::AndNot(tiny, hit);
-        if (!hn::AllFalse(di, more)) drawRows(g, bitsOf(di, more), x0, x1, y0, y1, sample);
+        const Sampled s = sampled(g, x0, y0, wide, high, at);
+        HWY_ALIGN int32_t low[kMaxLanes], pixel[kMaxLanes];
+        hn::Store(g.low, di, low);
+        const VI in_row = hn::Sub(x0, hn::Set(di, tile_.origin));
+        hn::Store(hn::Add(hn::Mul(y0, hn::Set(di, tile_.width)), in_row), di, pixel);
+        if (!hn::AllFalse(di, tiny)) drawTiny(s, tiny, low, pixel, sample);
+        const uint32_t more = bitsOf(di, hn::AndNot(tiny, hit));
+        if (more != 0) drawBlocks(s, more, low, pixel, sample);
     }
 
-    /// At most 2 x 2 pixels from (x0, y0); `two_x`, `two_y`: two columns, two rows.
-    HWY_INLINE void drawTiny(const Group& g, MI tiny, VI x0, VI y0, MI two_x, MI two_y,
-                             int sample) const {
+    HWY_INLINE static Sampled sampled(const Group& g, VI x0, VI y0, VI wide, VI high,
+                                      SampleOffset at) {
         const DI di;
         const DF df;
-        const SampleOffset at = offset_[sample];
+        const VI origin_x =
+            hn::Add(hn::ShiftLeft<kSubpixelBits>(x0), hn::Set(di, kHalfPixel + at.x));
+        const VI origin_y =
+            hn::Add(hn::ShiftLeft<kSubpixelBits>(y0), hn::Set(di, kHalfPixel + at.y));
         VI x[3], y[3];
         for (int k = 0; k < 3; ++k) {
-            x[k] = hn::Sub(
-                g.x[k], hn::Add(hn::ShiftLeft<kSubpixelBits>(x0), hn::Set(di, kHalfPixel + at.x)));
-            y[k] = hn::Sub(
-                g.y[k], hn::Add(hn::ShiftLeft<kSubpixelBits>(y0), hn::Set(di, kHalfPixel + at.y)));
+            x[k] = hn::Sub(g.x[k], origin_x);
+            y[k] = hn::Sub(g.y[k], origin_y);
         }
         const LaneEdge edge[3] = {
             {x[1], y[1], x[2], y[2]}, {x[2], y[2], x[0], y[0]}, {x[0], y[0], x[1], y[1]}};
-        VI value[3];
-        for (int k = 0; k < 3; ++k)
-            value[k] = edge[k].valueAtOrigin(x[(k + 1) % 3], y[(k + 1) % 3]);
-        const VF inv_area = hn::Div(hn::Set(df, 1.0f), hn::ConvertTo(df, g.area));
-        const VF d1 = hn::Sub(g.depth[1], g.depth[0]), d2 = hn::Sub(g.depth[2], g.depth[0]);
-        const VF nearest = hn::Max(g.depth[0], hn::Max(g.depth[1], g.depth[2]));
-        const VF farthest = hn::Min(g.depth[0], hn::Min(g.depth[1], g.depth[2]));
+        return {x0,
+                y0,
+                wide,
+                high,
+                {edge[0], edge[1], edge[2]},
+                {edge[0].valueAtOrigin(x[1], y[1]), edge[1].valueAtOrigin(x[2], y[2]),
+                 edge[2].valueAtOrigin(x[0], y[0])},
+                g.depth[0],
+                hn::Sub(g.depth[1], g.depth[0]),
+                hn::Sub(g.depth[2], g.depth[0]),
+                hn::Div(hn::Set(df, 1.0f), hn::ConvertTo(df, g.area)),
+                hn::Max(g.depth[0], hn::Max(g.depth[1], g.depth[2])),
+                hn::Min(g.depth[0], hn::Min(g.depth[1], g.depth[2]))};
+    }
 
-        HWY_ALIGN int32_t low[kMaxLanes], pixel[kMaxLanes], depth[kMaxLanes];
-        hn::Store(g.low, di, low);
-        hn::Store(hn::Add(hn::Mul(y0, hn::Set(di, tile_.width)), x0), di, pixel);
+    /// At most 2 x 2 pixels each, a triangle a lane.
+    HWY_INLINE void drawTiny(const Sampled& s, MI tiny, const int32_t* low, const int32_t* pixel,
+                             int sample) const {
+        const DI di;
+        const DF df;
+        HWY_ALIGN int32_t depth[kMaxLanes];
         const auto tryPixel = [&](MI lanes, const VI e[3], ptrdiff_t offset) HWY_ATTR {
-            const VI sign = hn::Or(hn::Or(hn::Add(e[0], edge[0].bias), hn::Add(e[1], edge[1].bias)),
-                                   hn::Add(e[2], edge[2].bias));
+            const VI sign =
+                hn::Or(hn::Or(hn::Add(e[0], s.edge[0].bias), hn::Add(e[1], s.edge[1].bias)),
+                       hn::Add(e[2], s.edge[2].bias));
             const MI inside = hn::And(lanes, hn::Gt(sign, hn::Set(di, -1)));
             uint32_t bits = bitsOf(di, inside);
             if (bits == 0) return;
-            const VF sum =
-                hn::Add(hn::Mul(hn::ConvertTo(df, e[1]), d1), hn::Mul(hn::ConvertTo(df, e[2]), d2));
-            const VF inv_depth = hn::Add(g.depth[0], hn::Mul(sum, inv_area));
-            hn::Store(hn::BitCast(di, hn::Min(hn::Max(inv_depth, farthest), nearest)), di, depth);
+            const VF sum = hn::Add(hn::Mul(hn::ConvertTo(df, e[1]), s.d1),
+                                   hn::Mul(hn::ConvertTo(df, e[2]), s.d2));
+            const VF inv_depth = hn::Add(s.d0, hn::Mul(sum, s.inv_area));
+            hn::Store(hn::BitCast(di, hn::Min(hn::Max(inv_depth, s.farthest), s.nearest)), di,
+                      depth);
             for (; bits != 0; bits &= bits - 1) {
                 const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(bits);
                 put(keyAt(pixel[lane] + offset, sample), depth[lane], uint32_t(low[lane]));
             }
         };
-        tryPixel(tiny, value, 0);
         const auto moved = [&](const VI e[3], bool down, VI out[3]) HWY_ATTR {
             for (int k = 0; k < 3; ++k)
-                out[k] = down ? hn::Add(e[k], hn::ShiftLeft<kSubpixelBits>(edge[k].dx))
-                              : hn::Sub(e[k], hn::ShiftLeft<kSubpixelBits>(edge[k].dy));
+                out[k] = down ? hn::Add(e[k], hn::ShiftLeft<kSubpixelBits>(s.edge[k].dx))
+                              : hn::Sub(e[k], hn::ShiftLeft<kSubpixelBits>(s.edge[k].dy));
         };
+        const MI two_x = hn::And(tiny, hn::Eq(s.wide, hn::Set(di, 1)));
+        const MI two_y = hn::And(tiny, hn::Eq(s.high, hn::Set(di, 1)));
         VI right[3], down[3];
-        moved(value, false, right);
-        tryPixel(hn::And(tiny, two_x), right, 1);
-        const MI lower = hn::And(tiny, two_y);
-        moved(value, true, down);
-        tryPixel(lower, down, tile_.width);
+        tryPixel(tiny, s.value, 0);
+        moved(s.value, false, right);
+        tryPixel(two_x, right, 1);
+        moved(s.value, true, down);
+        tryPixel(two_y, down, tile_.width);
         moved(right, true, down);
-        tryPixel(hn::And(lower, two_x), down, tile_.width + 1);
+        tryPixel(hn::And(two_x, two_y), down, tile_.width + 1);
     }
 
     HWY_INLINE VisibilityKey* keyAt(ptrdiff_t pixel, int sample) const {
         return tile_.key + pixel * kSamples + sample;
     }
 
-    void drawRows(const Group& g, uint32_t bits, VI x0, VI x1, VI y0, VI y1, int sample) const {
+    /// Larger ones, one after the other: blocks of four columns and as many rows as there are
+    /// lanes.
+    void drawBlocks(const Sampled& s, uint32_t bits, const int32_t* low, const int32_t* pixel,
+                    int sample) const {
         const DI di;
         const DF df;
-        HWY_ALIGN int32_t x[3][kMaxLanes], y[3][kMaxLanes], area[kMaxLanes], low[kMaxLanes];
-        HWY_ALIGN int32_t left[kMaxLanes], right[kMaxLanes], top[kMaxLanes], bottom[kMaxLanes];
-        HWY_ALIGN float depth[3][kMaxLanes];
+        HWY_ALIGN int32_t value[3][kMaxLanes], bias[3][kMaxLanes], step_x[3][kMaxLanes],
+            step_y[3][kMaxLanes], wide[kMaxLanes], high[kMaxLanes];
+        HWY_ALIGN float d0[kMaxLanes], d1[kMaxLanes], d2[kMaxLanes], inv_area[kMaxLanes],
+            nearest[kMaxLanes], farthest[kMaxLanes];
         for (int k = 0; k < 3; ++k) {
-            hn::Store(g.x[k], di, x[k]);
-            hn::Store(g.y[k], di, y[k]);
-            hn::Store(g.depth[k], df, depth[k]);
+            hn::Store(s.value[k], di, value[k]);
+            hn::Store(s.edge[k].bias, di, bias[k]);
+            hn::Store(hn::Neg(hn::ShiftLeft<kSubpixelBits>(s.edge[k].dy)), di, step_x[k]);
+            hn::Store(hn::ShiftLeft<kSubpixelBits>(s.edge[k].dx), di, step_y[k]);
         }
-        hn::Store(g.area, di, area);
-        hn::Store(g.low, di, low);
-        hn::Store(x0, di, left);
-        hn::Store(x1, di, right);
-        hn::Store(y0, di, top);
-        hn::Store(y1, di, bottom);
+        hn::Store(s.wide, di, wide);
+        hn::Store(s.high, di, high);
+        hn::Store(s.d0, df, d0);
+        hn::Store(s.d1, df, d1);
+        hn::Store(s.d2, df, d2);
+        hn::Store(s.inv_area, df, inv_area);
+        hn::Store(s.nearest, df, nearest);
+        hn::Store(s.farthest, df, farthest);
+
+        const int columns = int(std::min(hn::Lanes(di), size_t(4)));
+        const int rows = int(hn::Lanes(di)) / columns;
+        const VI column = hn::And(hn::Iota(di, 0), hn::Set(di, 3));
+        const VI row = hn::ShiftRight<2>(hn::Iota(di, 0));
+        HWY_ALIGN int32_t place[kMaxLanes], depth[kMaxLanes];
+        hn::Store(hn::Add(hn::Mul(row, hn::Set(di, tile_.width)), column), di, place);
         for (; bits != 0; bits &= bits - 1) {
             const auto i = hwy::Num0BitsBelowLS1Bit_Nonzero32(bits);
-            SmallTriangle t{{x[0][i], x[1][i], x[2][i]},
-                            {y[0][i], y[1][i], y[2][i]},
-                            {depth[0][i], depth[1][i], depth[2][i]},
-                            area[i],
-                            uint32_t(low[i])};
-            drawSmall(t, {left[i], top[i], right[i] + 1, bottom[i] + 1}, sample);
-        }
-    }
-
-    /// Row by row, eight pixels at a time.
-    HWY_INLINE void drawSmall(const SmallTriangle& t, const PixelBox& box, int sample) const {
-        const RI ri;
-        const RF rf;
-        const int lanes = int(hn::Lanes(ri));
-        const SampleOffset at = offset_[sample];
-        const int32_t origin_x = box.x0 * kSubpixel + kHalfPixel + at.x;
-        const int32_t origin_y = box.y0 * kSubpixel + kHalfPixel + at.y;
-        int32_t row[3], bias[3], step_x[3], step_y[3];
-        for (int k = 0; k < 3; ++k) {
-            const int a = (k + 1) % 3, b = (k + 2) % 3;
-            const int32_t dx = t.x[b] - t.x[a], dy = t.y[b] - t.y[a];
-            row[k] = dy * (t.x[a] - origin_x) - dx * (t.y[a] - origin_y);
-            bias[k] = dy < 0 || (dy == 0 && dx > 0) ? 0 : -1;
-            step_x[k] = -dy * kSubpixel;
-            step_y[k] = dx * kSubpixel;
-        }
-        const auto d0 = hn::Set(rf, t.depth[0]);
-        const auto d1 = hn::Set(rf, t.depth[1] - t.depth[0]),
-                   d2 = hn::Set(rf, t.depth[2] - t.depth[0]);
-        const auto nearest = hn::Set(rf, std::max({t.depth[0], t.depth[1], t.depth[2]}));
-        const auto farthest = hn::Set(rf, std::min({t.depth[0], t.depth[1], t.depth[2]}));
-        const auto inv_area = hn::Set(rf, 1.0f / float(t.area));
-        const auto iota = hn::Iota(ri, 0);
-        HWY_ALIGN int32_t depth[8];
-        for (int32_t y = box.y0; y < box.y1; ++y) {
-            for (int32_t x = box.x0; x < box.x1; x += lanes) {
-                hn::Vec<RI> e[3];
-                for (int k = 0; k < 3; ++k)
-                    e[k] = hn::Add(hn::Set(ri, row[k] + (x - box.x0) * step_x[k]),
-                                   hn::Mul(hn::Set(ri, step_x[k]), iota));
-                const auto sign = hn::Or(hn::Or(hn::Add(e[0], hn::Set(ri, bias[0])),
-                                                hn::Add(e[1], hn::Set(ri, bias[1]))),
-                                         hn::Add(e[2], hn::Set(ri, bias[2])));
-                const auto inside =
-                    hn::And(hn::Gt(sign, hn::Set(ri, -1)), hn::Lt(iota, hn::Set(ri, box.x1 - x)));
-                uint32_t bits = bitsOf(ri, inside);
-                if (bits == 0) continue;
-                const auto sum = hn::Add(hn::Mul(hn::ConvertTo(rf, e[1]), d1),
-                                         hn::Mul(hn::ConvertTo(rf, e[2]), d2));
-                const auto inv_depth = hn::Add(d0, hn::Mul(sum, inv_area));
-                hn::Store(hn::BitCast(ri, hn::Min(hn::Max(inv_depth, farthest), nearest)), ri,
-                          depth);
-                VisibilityKey* key = keyAt(ptrdiff_t(y) * tile_.width + x, sample);
-                for (; bits != 0; bits &= bits - 1) {
-                    const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(bits);
-                    put(key + lane * size_t(kSamples), depth[lane], t.low);
+            VI across[3], base[3];
+            for (int k = 0; k < 3; ++k) {
+                across[k] = hn::Mul(hn::Set(di, step_x[k][i]), column);
+                base[k] = hn::Add(hn::Add(hn::Set(di, value[k][i]), across[k]),
+                                  hn::Mul(hn::Set(di, step_y[k][i]), row));
+            }
+            for (int y = 0; y <= high[i]; y += rows) {
+                const MI in_height = hn::Lt(row, hn::Set(di, high[i] + 1 - y));
+                for (int x = 0; x <= wide[i]; x += columns) {
+                    VI e[3];
+                    for (int k = 0; k < 3; ++k)
+                        e[k] = hn::Add(base[k], hn::Set(di, x * step_x[k][i] + y * step_y[k][i]));
+                    const VI sign = hn::Or(hn::Or(hn::Add(e[0], hn::Set(di, bias[0][i])),
+                                                  hn::Add(e[1], hn::Set(di, bias[1][i]))),
+                                           hn::Add(e[2], hn::Set(di, bias[2][i])));
+                    const MI in_width = hn::Lt(column, hn::Set(di, wide[i] + 1 - x));
+                    uint32_t inside = bitsOf(
+                        di, hn::And(hn::And(in_height, in_width), hn::Gt(sign, hn::Set(di, -1))));
+                    if (inside == 0) continue;
+                    const VF sum = hn::Add(hn::Mul(hn::ConvertTo(df, e[1]), hn::Set(df, d1[i])),
+                                           hn::Mul(hn::ConvertTo(df, e[2]), hn::Set(df, d2[i])));
+                    const VF inv_depth =
+                        hn::Add(hn::Set(df, d0[i]), hn::Mul(sum, hn::Set(df, inv_area[i])));
+                    hn::Store(hn::BitCast(di, hn::Min(hn::Max(inv_depth, hn::Set(df, farthest[i])),
+                                                      hn::Set(df, nearest[i]))),
+                              di, depth);
+                    VisibilityKey* key = keyAt(pixel[i] + ptrdiff_t(y) * tile_.width + x, sample);
+                    for (; inside != 0; inside &= inside - 1) {
+                        const auto lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(inside);
+                        put(key + place[lane] * kSamples, depth[lane], uint32_t(low[i]));
+                    }
                 }
             }
-            for (int k = 0; k < 3; ++k) row[k] += step_y[k];
         }
     }
 
