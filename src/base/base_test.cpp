@@ -1,4 +1,9 @@
 #include <gtest/gtest.h>
+#include <sched.h>
+
+#include <atomic>
+#include <chrono>
+#include <thread>
 
 #include "base/budget.h"
 #include "base/check.h"
@@ -6,6 +11,7 @@
 #include "base/parallel.h"
 #include "base/progress.h"
 #include "base/text.h"
+#include "base/worker_placement.h"
 
 namespace pietra {
 namespace {
@@ -63,6 +69,28 @@ TEST(Progress, ticksAndCancels) {
     progress.endStage();
     EXPECT_EQ(sink.ended.done, 1000u);
     EXPECT_EQ(sink.ended.name, "work");
+}
+
+TEST(WorkerPlacement, KeepsWorkersOffOneProcessor) {
+    cpu_set_t allowed;
+    ASSERT_EQ(::sched_getaffinity(0, sizeof allowed, &allowed), 0);
+    if (CPU_COUNT(&allowed) < 2) GTEST_SKIP() << "one processor";
+    WorkerPlacement placement;
+    const std::thread::id frame_thread = std::this_thread::get_id();
+    std::atomic<int> workers{0}, misplaced{0};
+    for (int round = 0; round < 1000 && workers == 0; ++round) {
+        placement.update();
+        parallelFor(64, [&](size_t) {
+            std::this_thread::sleep_for(std::chrono::microseconds(50));
+            if (std::this_thread::get_id() == frame_thread) return;
+            cpu_set_t mine;
+            ++workers;
+            misplaced += ::sched_getaffinity(0, sizeof mine, &mine) != 0 ||
+                         CPU_COUNT(&mine) != CPU_COUNT(&allowed) - 1;
+        });
+    }
+    EXPECT_GT(workers, 0);
+    EXPECT_EQ(misplaced, 0);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <optional>
 
+#include "base/worker_placement.h"
 #include "render/live/live_renderer.h"
 
 namespace pietra {
@@ -10,6 +11,7 @@ public:
     PageSink* sink() override { return nullptr; }
 
     void draw(std::span<const ModelPatches> models, const LiveSettings& settings) override {
+        placement_.update();
         const ModelPatches& first = models.front();
         if (!rasteriser_ || samples_ != settings.samples)
             rasteriser_.emplace(first.view, *first.lattice, settings.samples, settings.shade);
@@ -24,6 +26,7 @@ public:
     double gpuMs() const override { return 0; }
 
 private:
+    WorkerPlacement placement_;
     std::optional<Rasteriser> rasteriser_;
     int samples_ = 0;
     const Picture* picture_ = nullptr;
