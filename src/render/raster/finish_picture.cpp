@@ -5,6 +5,8 @@
 #include <bit>
 #include <limits>
 
+#include "render/raster/resolve_kernel.h"
+
 namespace pietra {
 namespace {
 
@@ -35,6 +37,10 @@ private:
 /// Of columns x & 3, from that of the first pixel of a row.
 using Background = std::array<Rgba8, 4>;
 
+void paint(const Background& background, Rgba8* colour, size_t width) {
+    for (size_t x = 0; x < width; ++x) colour[x] = background[x & 3];
+}
+
 struct Row {
     VisibilityKey* key;
     const Rgba8* sample_colour;
@@ -45,15 +51,16 @@ struct Row {
 
 /// These return how many pixels are covered.
 uint64_t finishRowOfOne(const Row& row, const Background& background) {
-    uint64_t covered = 0;
-    for (size_t x = 0; x < row.width; ++x) {
-        const VisibilityKey key = row.key[x];
-        const bool empty = key == 0;
-        row.depth[x] = empty ? kNothing : depthOf(key);
-        row.colour[x] = empty ? background[x & 3] : row.sample_colour[x];
-        row.key[x] = 0;
-        covered += !empty;
+    // In place, the colours are there, but for the background.
+    if (row.sample_colour == row.colour) {
+        for (size_t x = 0; x < row.width; ++x)
+            if (row.key[x] == 0) row.colour[x] = background[x & 3];
+    } else {
+        paint(background, row.colour, row.width);
     }
+    const size_t covered =
+        finishSamples(row.key, row.sample_colour, row.width, row.colour, row.depth);
+    std::fill_n(row.key, row.width, VisibilityKey(0));
     return covered;
 }
 
@@ -106,7 +113,7 @@ void finishEmpty(const ShadeSettings& settings, const PixelBox& box, Picture& pi
     for (int32_t y = box.y0; y < box.y1; ++y) {
         const Background background = backgroundFrom(settings, picture, box.x0, y);
         const size_t first = picture.index(box.x0, y), width = size_t(box.x1 - box.x0);
-        for (size_t x = 0; x < width; ++x) picture.colour[first + x] = background[x & 3];
+        paint(background, picture.colour.data() + first, width);
         std::fill_n(picture.depth.begin() + ptrdiff_t(first), width, kNothing);
     }
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "render/raster/resolve_kernel.h"
+
 namespace pietra {
 namespace {
 
@@ -68,18 +70,10 @@ constexpr int32_t kRun = 64;  // pixels between two checks for room
 
 void collectOne(const VisibilityTile& tile, const DrawChunk& chunk, Collector& collector, int32_t y,
                 int32_t x0, int32_t x1) {
-    const KeyRange range(chunk);
-    VisibilityKey* keys = tile.key + tile.at(x0, y);
-    ShadeItem* item = collector.room(kRun);
-    for (int32_t x = x0; x < x1; ++x, ++keys) {
-        const VisibilityKey key = *keys;
-        const bool mine = range.holds(key);
-        // Counts only if it is the chunk's: without a branch, as that is anyone's guess.
-        *item = ShadeItem::at(range.triangle(key, chunk), x, y, 1);
-        item += mine;
-        *keys = mine ? key | kResolved : key;
-    }
-    collector.taken(item);
+    const auto count = size_t(x1 - x0);
+    collector.taken(collectItems(
+        tile.key + tile.at(x0, y), count, {chunk.firstNumber(), chunk.first, chunk.count},
+        ShadeItem::at(0, x0, y, 1), collector.room(count + kCollectSlack)));
 }
 
 /// Each triangle once a pixel, with the mask of its samples.
