@@ -51,9 +51,9 @@ PagePool::PagePool(SceneModels& models, size_t ram_bytes, size_t table_bytes, in
       ram_(ram_bytes - std::min(ram_bytes, table_bytes)),
       device_(sink != nullptr ? sink->capacityBytes() : 0) {
     loadRoots(table_bytes);
-    std::vector<const ModelReader*> readers;
-    for (const auto& model : models) readers.push_back(&model->reader);
-    loader_ = std::make_unique<PageLoader>(std::move(readers), loader_threads);
+    std::vector<PageSource> sources;
+    for (const auto& model : models) sources.push_back({&model->reader});
+    loader_ = std::make_unique<PageLoader>(std::move(sources), models.empty() ? 0 : loader_threads);
 }
 
 PagePool::~PagePool() {
@@ -232,6 +232,15 @@ bool PagePool::provide(const Wanted& wanted, std::vector<PageKey>& to_load) {
         to_load.push_back(key);
     }
     return true;
+}
+
+size_t PagePool::release(size_t bytes) {
+    const size_t before = ram_.used;
+    ram_.makeRoom(
+        ram_.budget - std::min(ram_.budget, ram_.used + ram_.reserved + ram_.elsewhere) + bytes,
+        Need::kDraw, frame_, [&] { return sink_ != nullptr ? copiesToDrop() : pagesToLeave(); },
+        [&](const PageKey& key) { return sink_ != nullptr ? dropCopy(key) : leave(key); });
+    return before - ram_.used;
 }
 
 bool PagePool::makeRoomInRam(size_t bytes, Need need) {

@@ -41,6 +41,11 @@ public:
     /// Has the loader load what fits, after making room.
     void load();
 
+    /// What others hold of the memory, in RAM. These say so in each frame, before load().
+    void setElsewhere(size_t bytes) { ram_.elsewhere = bytes; }
+    /// For them: lets go of so many bytes that this frame does not need, or fewer. Of how many?
+    size_t release(size_t bytes);
+
     /// Something that is to be drawn does not fit.
     bool blocked() const { return blocked_; }
     /// Of what is wanted in this frame, not for later, how much is on its way or does not fit.
@@ -49,6 +54,8 @@ public:
     const PageMemory& drawn() const { return sink_ != nullptr ? device_ : ram_; }
     /// Whether so many bytes may stay in RAM, beside what passes through.
     bool mayStay(size_t bytes) const { return sink_ == nullptr || bytes <= ram_.budget / 2; }
+    size_t ramBudget() const { return ram_.budget; }
+    bool inRam() const { return sink_ == nullptr; }  ///< pages are drawn from there
     /// In RAM, what is on its way included.
     size_t ramBytes() const { return ram_.used + begun_bytes_; }
     size_t deviceBytes() const { return device_.used; }
