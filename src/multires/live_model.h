@@ -48,17 +48,19 @@ struct LiveTask {
     /// For adaption, about; some is always done.
     double milliseconds = std::numeric_limits<double>::infinity();
     size_t most_bytes = 0;  ///< at least what it holds
+    uint64_t most_triangles = std::numeric_limits<uint64_t>::max();
 };
 
 /// What a frame did.
 struct LiveFrame {
     uint32_t operations = 0;
-    bool busy = false;             ///< there was not enough time for all that could be done
-    bool short_of_memory = false;  ///< something that is needed does not fit, and nothing else
-                                   ///< can be done
-    size_t missing = 0;            ///< pages that are needed, and not known to be damaged
-    size_t needed_bytes = 0;       ///< of what it holds, or asks for, what this view uses
-    double largest_px = 0;         ///< of error in the picture; infinite in a sphere not refined
+    bool busy = false;  ///< there was not enough time for all that could be done
+    /// Something that is needed does not fit most_bytes or most_triangles, and nothing else can be
+    /// done.
+    bool short_of_memory = false, short_of_triangles = false;
+    size_t missing = 0;       ///< pages that are needed, and not known to be damaged
+    size_t needed_bytes = 0;  ///< of what it holds, or asks for, what this view uses
+    double largest_px = 0;    ///< of error in the picture; infinite in a sphere not refined
     uint64_t triangles = 0;
 };
 

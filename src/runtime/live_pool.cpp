@@ -101,6 +101,11 @@ bool LivePool::shortOfMemory() const {
                        [](const Part& part) { return part.frame.short_of_memory; });
 }
 
+bool LivePool::shortOfTriangles() const {
+    return std::any_of(parts_.begin(), parts_.end(),
+                       [](const Part& part) { return part.frame.short_of_triangles; });
+}
+
 uint32_t LivePool::operations() const {
     uint32_t count = 0;
     for (const Part& part : parts_) count += part.frame.operations;

@@ -37,6 +37,7 @@ public:
     /// Pages needed and under way, and models that had no time to do all they could.
     size_t missing() const;
     bool shortOfMemory() const;
+    bool shortOfTriangles() const;
     uint32_t operations() const;
     /// Lets go of about so many bytes that the last frame did not need. Of how many?
     size_t release(size_t bytes);

@@ -201,6 +201,7 @@ void PagePool::reserve(std::span<const PageKey> begun) {
             device_.reserved += modelOf(key).drawn_bytes[key.page];
     }
     begun_bytes_ = ram_.reserved;
+    if (sink_ != nullptr) device_.used = sink_->usedBytes();
     for (const PageKey& key : arriving_) device_.reserved += modelOf(key).drawn_bytes[key.page];
 }
 
@@ -236,11 +237,16 @@ bool PagePool::provide(const Wanted& wanted, std::vector<PageKey>& to_load) {
 
 size_t PagePool::release(size_t bytes) {
     const size_t before = ram_.used;
-    ram_.makeRoom(
-        ram_.budget - std::min(ram_.budget, ram_.used + ram_.reserved + ram_.elsewhere) + bytes,
-        Need::kDraw, frame_, [&] { return sink_ != nullptr ? copiesToDrop() : pagesToLeave(); },
-        [&](const PageKey& key) { return sink_ != nullptr ? dropCopy(key) : leave(key); });
+    const size_t more = ram_.free() + bytes;
+    (void)(sink_ != nullptr ? makeRoomInRam(more, Need::kDraw) : makeRoomToDraw(more, Need::kDraw));
     return before - ram_.used;
+}
+
+size_t PagePool::releaseDevice(size_t bytes) {
+    if (sink_ == nullptr) return 0;
+    const size_t before = device_.used = sink_->usedBytes();
+    (void)makeRoomToDraw(device_.free() + bytes, Need::kDraw);
+    return before - device_.used;
 }
 
 bool PagePool::makeRoomInRam(size_t bytes, Need need) {

@@ -15,6 +15,7 @@
 #include "base/text.h"
 #include "runtime/live_pool.h"
 #include "runtime/live_settle.h"
+#include "runtime/live_uploads.h"
 #include "runtime/page_pool.h"
 #include "runtime/scene_tolerance.h"
 
@@ -50,6 +51,7 @@ public:
           live_(thoseThat(readers, false), settings.open_live, settings.loader_threads),
           table_bytes_(tablesOf(readers)),
           pages_(models_, settings.ram_bytes, table_bytes_, settings.loader_threads, settings.sink),
+          uploads_(settings.sink, uint32_t(models_.size())),
           adapt_ms_(settings.adapt_ms) {
         uint32_t patches = 0, live = 0;
         for (const ModelReader* reader : readers)
@@ -87,6 +89,7 @@ private:
     void select(uint32_t m, const FrameRequest& request, ModelFrame& out);
     void adapt(uint32_t i, const FrameRequest& request, ModelFrame& out);
     bool isBlocked();
+    double usedShare() const;
     void wantMissing();
     void prefetch(const FrameRequest& request);
     Camera cameraAhead(const FrameRequest& request) const;
@@ -98,6 +101,8 @@ private:
     LivePool live_;
     const size_t table_bytes_;
     PagePool pages_;
+    LiveUploads uploads_;
+    bool uploads_fit_ = true;
     std::vector<Part> parts_;
     const double adapt_ms_;
     std::vector<Missing> missing_;
@@ -144,8 +149,7 @@ const Frame& Scene::Impl::update(const FrameRequest& request) {
     tolerance_.adapt({.same_request = last_.sameView(request),
                       .blocked = isBlocked(),
                       .missing = missing,
-                      .used = used_bytes_ + (pages_.inRam() ? live_.neededBytes() : 0),
-                      .budget = pages_.drawn().budget});
+                      .used_share = usedShare()});
     frame_.settled = tolerance_.settled();
     last_ = request;
     frame_.resident_bytes = pages_.ramBytes() + live_.bytes() + table_bytes_;
@@ -158,8 +162,21 @@ const Frame& Scene::Impl::update(const FrameRequest& request) {
 /// Something needed does not fit, and nobody has anything that is not needed.
 bool Scene::Impl::isBlocked() {
     if (pages_.blocked()) return live_.release(kReleasedBytes) == 0;
+    if ((live_.shortOfTriangles() || !uploads_fit_) && pages_.releaseDevice(kReleasedBytes) == 0)
+        return true;
     return live_.shortOfMemory() &&
            live_.release(kReleasedBytes) + pages_.release(kReleasedBytes) == 0;
+}
+
+/// Of the memory of which this frame uses the larger part.
+double Scene::Impl::usedShare() const {
+    const bool has_sink = pages_.deviceBudget() > 0;
+    const size_t in_ram = live_.neededBytes() + (has_sink ? 0 : used_bytes_);
+    const double ram = double(in_ram) / double(pages_.ramBudget());
+    if (!has_sink) return ram;
+    // Meshes that are adapted do not use all of a sink.
+    const double device = double(used_bytes_) + double(uploads_.bytes()) / LiveUploads::kUsable;
+    return std::max(ram, device / double(pages_.deviceBudget()));
 }
 
 void Scene::Impl::select(const FrameRequest& request) {
@@ -203,10 +220,13 @@ void Scene::Impl::adapt(uint32_t i, const FrameRequest& request, ModelFrame& out
     const LiveFrame& live = live_.adapt(i,
                                         {.view = &out.view,
                                          .pixels = request.pixels * tolerance_.factor(),
-                                         .milliseconds = adapt_ms_ / double(live_.size())},
+                                         .milliseconds = adapt_ms_ / double(live_.size()),
+                                         .most_triangles = uploads_.mostTriangles(i)},
                                         pages_.ramBudget() - std::min(pages_.ramBudget(), taken));
     frame_.adapt_ms += watch.ms();
     frame_.tolerance_px = std::max(frame_.tolerance_px, live.largest_px);
+    if (i == 0) uploads_fit_ = true;
+    uploads_fit_ &= uploads_.update(i, live_.model(i).chunks());
     const auto m = uint32_t(models_.size()) + i;
     listChunks(live_.model(i).chunks(), m, out.view, request.culling, request.show_error,
                out.patches);

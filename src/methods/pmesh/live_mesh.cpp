@@ -103,7 +103,14 @@ const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
     limits.milliseconds = task.milliseconds;
     limits.operations = kPassOperations;
     const size_t node_bytes = nodes_.loaded() * kNodeBytes;
-    limits.vertices = (task.most_bytes - std::min(task.most_bytes, node_bytes)) / kVertexBytes;
+    // A vertex more is two triangles more, at most.
+    const ProgressiveMesh& mesh = nodes_.mesh();
+    const uint64_t base = mesh.base_triangle.size();
+    const size_t in_memory =
+        (task.most_bytes - std::min(task.most_bytes, node_bytes)) / kVertexBytes;
+    const uint64_t drawable =
+        mesh.base_vertex.size() + (std::max(task.most_triangles, base) - base) / 2;
+    limits.vertices = std::min<uint64_t>(in_memory, drawable);
     const PassCounts counts = adaption_.frame(criterion, limits);
     nodes_.note(adaption_);
     nodes_.setMost((task.most_bytes - std::min(task.most_bytes, meshBytes())) / kNodeBytes);
@@ -114,10 +121,11 @@ const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
     frame_.missing = nodes_.requests(~size_t(0)).size();
     frame_.needed_bytes = nodes_.required() * kNodeBytes + meshBytes();
     frame_.triangles = adaption_.mesh().faceCount();
-    frame_.short_of_memory =
-        counts.finished &&
-        (counts.short_of_room || nodes_.required() * kNodeBytes + meshBytes() > task.most_bytes);
-    if (counts.short_of_room) nodes_.evictOldest();
+    const bool is_short = counts.finished && counts.short_of_room;
+    frame_.short_of_triangles = is_short && drawable <= in_memory;
+    frame_.short_of_memory = (is_short && in_memory < drawable) ||
+                             (counts.finished && frame_.needed_bytes > task.most_bytes);
+    if (frame_.short_of_memory) nodes_.evictOldest();
     const bool is_done = counts.finished && !counts.short_of_room && adaption_.waiting().empty();
     frame_.largest_px = is_done ? task.pixels : largestError(*task.view);
     if (faults_.empty() && adaption_.refused() > 0)
