@@ -52,8 +52,8 @@ int main(int argc, char** argv) {
     std::vector<const ModelReader*> models;
     for (int i = 4; i < argc; ++i)
         models.push_back(readers.emplace_back(std::make_unique<ModelReader>(argv[i])).get());
-    const CameraPath path =
-        standardPath(*parseStandardPath(argv[1]), coarseSurface(models), UpAxis::kZ, kSize);
+    const CameraPath path = standardPath(*parseStandardPath(argv[1]),
+                                         coarseSurface(models, nullptr), UpAxis::kZ, kSize);
     Scene scene(models, {size_t(2) << 30, 1});
     const View any({}, kSize, {});
     Way way[2] = {{Rasteriser(any, {}, samples, {}), false},

@@ -143,7 +143,7 @@ int main(int argc, char** argv) {
     const ModelReader* models[] = {&model};
     const FullMesh full(model);
     const CameraPath path = standardPath(path_kind.value_or(StandardPath::kOrbit),
-                                         coarseSurface(models), UpAxis::kZ, kSize);
+                                         coarseSurface(models, nullptr), UpAxis::kZ, kSize);
     Progress progress;
     std::vector<double> ratios;
     for (int i = 0; i < views; ++i) {

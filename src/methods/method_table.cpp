@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 #include "methods/pmesh/build.h"
+#include "methods/pmesh/live_mesh.h"
 #include "methods/pmesh/model.h"
 #include "methods/tetra/build.h"
 
@@ -14,9 +15,18 @@ namespace {
 constexpr Method kMethods[] = {
     {"tetra", "Adaptive TetraPuzzles: patches in a hierarchy of tetrahedra", tetra::build, true,
      nullptr},
-    {"pmesh", "progressive mesh: vertex by vertex; to be extracted, not drawn yet", pmesh::build,
-     false, pmesh::openModel},
+    {"pmesh", "progressive mesh: refined vertex by vertex, in fewer triangles", pmesh::build, false,
+     pmesh::openModel, pmesh::openLive},
 };
+
+const Method& methodOf(const ModelReader& reader) {
+    const Method* method = findMethod(reader.info().method);
+    if (!method || !method->open)
+        throw InputError(
+            reader.path(), "",
+            fmt::format("its method, {}, is unknown to this program", reader.info().method));
+    return *method;
+}
 
 }  // namespace
 
@@ -25,13 +35,11 @@ std::span<const Method> methods() {
 }
 
 std::unique_ptr<AdaptiveModel> openAdaptive(const ModelReader& reader) {
-    if (reader.hasPatches()) return nullptr;
-    const Method* method = findMethod(reader.info().method);
-    if (!method || !method->open)
-        throw InputError(
-            reader.path(), "",
-            fmt::format("its method, {}, is unknown to this program", reader.info().method));
-    return method->open(reader);
+    return reader.hasPatches() ? nullptr : methodOf(reader).open(reader);
+}
+
+std::unique_ptr<LiveModel> openLive(const ModelReader& reader) {
+    return reader.hasPatches() ? nullptr : methodOf(reader).open_live(reader);
 }
 
 bool provesErrors(const ModelInfo& info) {

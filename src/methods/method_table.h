@@ -18,5 +18,7 @@ bool provesErrors(const ModelInfo& info);
 
 /// Null for a model whose pages are patches. Throws InputError where the program lacks its method.
 std::unique_ptr<AdaptiveModel> openAdaptive(const ModelReader& reader);
+/// Likewise; an OpenLive.
+std::unique_ptr<LiveModel> openLive(const ModelReader& reader);
 
 }  // namespace pietra

@@ -14,6 +14,7 @@
 #include "geometry/lattice.h"
 #include "io/triangle_source.h"
 #include "multires/adaptive_model.h"
+#include "multires/live_model.h"
 
 namespace pietra {
 
@@ -42,8 +43,6 @@ struct BuildReport {
     std::vector<std::string> notes;  ///< sentences for the user
 };
 
-class ModelReader;
-
 struct Method {
     const char* name;     ///< as in --method and in the file
     const char* summary;  ///< one line for --help
@@ -56,6 +55,8 @@ struct Method {
     /// Null for a method whose pages are patches, of which the house makes cuts itself. The reader,
     /// of a file of this method, must outlive the result. Throws InputError.
     std::unique_ptr<AdaptiveModel> (*open)(const ModelReader& reader) = nullptr;
+    /// Likewise, and goes with it: to be looked at.
+    OpenLive open_live = nullptr;
 };
 
 }  // namespace pietra

@@ -20,8 +20,8 @@ void stayInTheBackground() {
 
 }  // namespace
 
-PageLoader::PageLoader(std::vector<const ModelReader*> models, int threads)
-    : models_(std::move(models)) {
+PageLoader::PageLoader(std::vector<PageSource> sources, int threads)
+    : sources_(std::move(sources)) {
     for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
 }
 
@@ -71,15 +71,22 @@ bool PageLoader::next(PageKey& key) {
     return true;
 }
 
+void PageLoader::load(LoadedPage& page, std::vector<std::byte>& bytes) const {
+    const PageSource& source = sources_[page.key.model];
+    bytes.clear();
+    if (!source.reader->tryReadPage(page.key.page, bytes, page.fault)) return;
+    if (source.live != nullptr)
+        page.live = source.live->decode(page.key.page, bytes, page.fault);
+    else if (!source.reader->tryDecode(page.key.page, bytes, page.patches, page.fault))
+        page.patches.clear();
+}
+
 void PageLoader::work() {
     std::vector<std::byte> bytes;
     stayInTheBackground();
     for (PageKey key; next(key);) {
-        LoadedPage loaded{key, {}, {}};
-        const ModelReader& model = *models_[key.model];
-        if (!model.tryReadPage(key.page, bytes, loaded.fault) ||
-            !model.tryDecode(key.page, bytes, loaded.patches, loaded.fault))
-            loaded.patches.clear();
+        LoadedPage loaded{key, {}, {}, {}};
+        load(loaded, bytes);
         const std::lock_guard lock(mutex_);
         bytes_read_ += bytes.size();
         ready_.push_back(std::move(loaded));

@@ -8,6 +8,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <mutex>
 #include <span>
 #include <string>
@@ -16,20 +17,28 @@
 
 #include "geometry/mesh.h"
 #include "multires/draw_list.h"
+#include "multires/live_model.h"
 #include "store/model_reader.h"
 
 namespace pietra {
 
+/// A model and, where its pages are not patches, who decodes them.
+struct PageSource {
+    const ModelReader* reader;
+    const LiveModel* live = nullptr;
+};
+
 struct LoadedPage {
     PageKey key;
     std::vector<Mesh> patches;
+    std::unique_ptr<LivePage> live;  ///< instead of patches
     std::string fault;  ///< if not empty, the page is damaged or cannot be read, and has no patches
 };
 
 class PageLoader {
 public:
-    /// Readers must outlive this.
-    PageLoader(std::vector<const ModelReader*> models, int threads);
+    /// What the sources point to must outlive this.
+    PageLoader(std::vector<PageSource> sources, int threads);
     ~PageLoader();
     PageLoader(const PageLoader&) = delete;
     PageLoader& operator=(const PageLoader&) = delete;
@@ -46,9 +55,10 @@ public:
 
 private:
     void work();
+    void load(LoadedPage& page, std::vector<std::byte>& bytes) const;
     bool next(PageKey& key);
 
-    std::vector<const ModelReader*> models_;
+    std::vector<PageSource> sources_;
     mutable std::mutex mutex_;
     std::condition_variable wake_;
     std::deque<PageKey> queue_;

@@ -26,9 +26,11 @@ public:
 
     const size_t budget;
     size_t used = 0;
-    size_t reserved = 0;  ///< for pages on their way
+    size_t reserved = 0;   ///< for pages on their way
+    size_t elsewhere = 0;  ///< taken by others
 
-    bool fits(size_t bytes) const { return used + reserved + bytes <= budget; }
+    size_t free() const { return budget - std::min(budget, used + reserved + elsewhere); }
+    bool fits(size_t bytes) const { return used + reserved + elsewhere + bytes <= budget; }
     /// Forgets what may leave: at the beginning of a frame.
     void beginFrame() { victims_.reset(); }
 

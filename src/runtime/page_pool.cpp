@@ -51,9 +51,9 @@ PagePool::PagePool(SceneModels& models, size_t ram_bytes, size_t table_bytes, in
       ram_(ram_bytes - std::min(ram_bytes, table_bytes)),
       device_(sink != nullptr ? sink->capacityBytes() : 0) {
     loadRoots(table_bytes);
-    std::vector<const ModelReader*> readers;
-    for (const auto& model : models) readers.push_back(&model->reader);
-    loader_ = std::make_unique<PageLoader>(std::move(readers), loader_threads);
+    std::vector<PageSource> sources;
+    for (const auto& model : models) sources.push_back({&model->reader});
+    loader_ = std::make_unique<PageLoader>(std::move(sources), models.empty() ? 0 : loader_threads);
 }
 
 PagePool::~PagePool() {
@@ -201,6 +201,7 @@ void PagePool::reserve(std::span<const PageKey> begun) {
             device_.reserved += modelOf(key).drawn_bytes[key.page];
     }
     begun_bytes_ = ram_.reserved;
+    if (sink_ != nullptr) device_.used = sink_->usedBytes();
     for (const PageKey& key : arriving_) device_.reserved += modelOf(key).drawn_bytes[key.page];
 }
 
@@ -232,6 +233,20 @@ bool PagePool::provide(const Wanted& wanted, std::vector<PageKey>& to_load) {
         to_load.push_back(key);
     }
     return true;
+}
+
+size_t PagePool::release(size_t bytes) {
+    const size_t before = ram_.used;
+    const size_t more = ram_.free() + bytes;
+    (void)(sink_ != nullptr ? makeRoomInRam(more, Need::kDraw) : makeRoomToDraw(more, Need::kDraw));
+    return before - ram_.used;
+}
+
+size_t PagePool::releaseDevice(size_t bytes) {
+    if (sink_ == nullptr) return 0;
+    const size_t before = device_.used = sink_->usedBytes();
+    (void)makeRoomToDraw(device_.free() + bytes, Need::kDraw);
+    return before - device_.used;
 }
 
 bool PagePool::makeRoomInRam(size_t bytes, Need need) {

@@ -41,17 +41,24 @@ public:
     /// Has the loader load what fits, after making room.
     void load();
 
+    /// What others hold of the memory, in RAM. These say so in each frame, before load().
+    void setElsewhere(size_t bytes) { ram_.elsewhere = bytes; }
+    /// For them: lets go of so many bytes that this frame does not need, or fewer. Of how many?
+    size_t release(size_t bytes);
+    /// The same, in the sink.
+    size_t releaseDevice(size_t bytes);
+
     /// Something that is to be drawn does not fit.
     bool blocked() const { return blocked_; }
     /// Of what is wanted in this frame, not for later, how much is on its way or does not fit.
     size_t missing() const { return missing_; }
-    /// Of what may be drawn.
-    const PageMemory& drawn() const { return sink_ != nullptr ? device_ : ram_; }
     /// Whether so many bytes may stay in RAM, beside what passes through.
     bool mayStay(size_t bytes) const { return sink_ == nullptr || bytes <= ram_.budget / 2; }
+    size_t ramBudget() const { return ram_.budget; }
+    size_t deviceBudget() const { return device_.budget; }  ///< 0: there is no sink
     /// In RAM, what is on its way included.
     size_t ramBytes() const { return ram_.used + begun_bytes_; }
-    size_t deviceBytes() const { return device_.used; }
+    size_t deviceBytes() const { return sink_ != nullptr ? sink_->usedBytes() : 0; }
     uint64_t bytesRead() const { return loader_->bytesRead(); }
     const std::vector<std::string>& faults() const { return faults_; }
 

@@ -84,6 +84,7 @@ std::optional<Vec3d> pickFinest(std::span<const ModelReader* const> models, cons
     const Vec3d forward = glm::normalize(direction);
     double nearest = kNever;
     for (const ModelReader* model : models) {
+        if (!model->hasPatches()) continue;
         const Lattice& lattice = model->info().lattice;
         const Ray ray{lattice.toLattice(eye), forward};
         nearest = std::min(nearest, pick(*model, ray) * lattice.step);

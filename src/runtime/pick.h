@@ -10,9 +10,9 @@
 namespace pietra {
 
 /// Where the ray from `eye` first meets the finest level of any of the models; nothing where it
-/// meets none. Input coordinates; exact but for rounding. Reads and decodes the pages along the
-/// ray, nearest first, one in memory at a time: not for the frame thread. Thread-safe. Throws what
-/// ModelReader::decode throws.
+/// meets none; models whose pages are not patches are left out. Input coordinates; exact but for
+/// rounding. Reads and decodes the pages along the ray, nearest first, one in memory at a time: not
+/// for the frame thread. Thread-safe. Throws what ModelReader::decode throws.
 std::optional<Vec3d> pickFinest(std::span<const ModelReader* const> models, const Vec3d& eye,
                                 const Vec3d& direction);
 

@@ -1,5 +1,7 @@
 #include "runtime/scene.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -10,6 +12,10 @@
 #include "base/parallel.h"
 #include "base/progress.h"
 #include "base/stopwatch.h"
+#include "base/text.h"
+#include "runtime/live_pool.h"
+#include "runtime/live_settle.h"
+#include "runtime/live_uploads.h"
 #include "runtime/page_pool.h"
 #include "runtime/scene_tolerance.h"
 
@@ -20,6 +26,16 @@ namespace {
 /// goes to where it stands.
 constexpr double kLookahead = 0.5, kNextLevel = 0.5;
 constexpr uint32_t kPrefetchFrames = 4;
+/// What patches let go of at a time for adapted meshes, and the other way round.
+constexpr size_t kReleasedBytes = size_t(2) << 20;
+
+std::vector<const ModelReader*> thoseThat(const std::vector<const ModelReader*>& all,
+                                          bool have_patches) {
+    std::vector<const ModelReader*> some;
+    for (const ModelReader* reader : all)
+        if (reader->hasPatches() == have_patches) some.push_back(reader);
+    return some;
+}
 
 }  // namespace
 
@@ -31,17 +47,37 @@ size_t tableBytes(const ModelReader& model) {
 class Scene::Impl {
 public:
     Impl(const std::vector<const ModelReader*>& readers, const SceneSettings& settings)
-        : models_(makeModels(readers)),
+        : models_(makeModels(thoseThat(readers, true))),
+          live_(thoseThat(readers, false), settings.open_live, settings.loader_threads),
           table_bytes_(tablesOf(readers)),
-          pages_(models_, settings.ram_bytes, table_bytes_, settings.loader_threads,
-                 settings.sink) {
+          pages_(models_, settings.ram_bytes, table_bytes_, settings.loader_threads, settings.sink),
+          uploads_(settings.sink, uint32_t(models_.size())),
+          adapt_ms_(settings.adapt_ms) {
+        uint32_t patches = 0, live = 0;
+        for (const ModelReader* reader : readers)
+            parts_.push_back(reader->hasPatches() ? Part{reader, false, patches++}
+                                                  : Part{reader, true, live++});
+        if (pages_.ramBytes() + live_.bytes() > pages_.ramBudget())
+            throw MemoryError(
+                fmt::format("the tables and the coarsest level need {}",
+                            formatBytes(table_bytes_ + pages_.ramBytes() + live_.bytes())));
         last_.seconds = -std::numeric_limits<double>::infinity();
     }
 
     const Frame& update(const FrameRequest& request);
-    const std::vector<std::string>& faults() const { return pages_.faults(); }
+    const std::vector<std::string>& faults() {
+        faults_ = pages_.faults();
+        faults_.insert(faults_.end(), live_.faults().begin(), live_.faults().end());
+        return faults_;
+    }
 
 private:
+    /// A model of the scene: one of models_, or of live_.
+    struct Part {
+        const ModelReader* reader;
+        bool is_live;
+        uint32_t index;
+    };
     struct Missing {
         PageKey key;
         float pixels;
@@ -50,6 +86,10 @@ private:
     static SceneModels makeModels(const std::vector<const ModelReader*>& readers);
     static size_t tablesOf(const std::vector<const ModelReader*>& readers);
     void select(const FrameRequest& request);
+    void select(uint32_t m, const FrameRequest& request, ModelFrame& out);
+    void adapt(uint32_t i, const FrameRequest& request, ModelFrame& out);
+    bool isBlocked();
+    double usedShare() const;
     void wantMissing();
     void prefetch(const FrameRequest& request);
     Camera cameraAhead(const FrameRequest& request) const;
@@ -58,8 +98,13 @@ private:
     void describe(const SceneModel& model, uint32_t m, bool show_error, ModelFrame& out) const;
 
     SceneModels models_;
+    LivePool live_;
     const size_t table_bytes_;
     PagePool pages_;
+    LiveUploads uploads_;
+    bool uploads_fit_ = true;
+    std::vector<Part> parts_;
+    const double adapt_ms_;
     std::vector<Missing> missing_;
     std::vector<PageKey> missing_for_eye_;
     std::vector<NodeIndex> cut_for_eye_;    // what tells where the eye is
@@ -71,6 +116,7 @@ private:
     Frame frame_;
     std::vector<PageKey> ahead_, next_level_;  // to be prefetched
     std::vector<PageRequest> requests_;        // scratch
+    std::vector<std::string> faults_;
 };
 
 size_t Scene::Impl::tablesOf(const std::vector<const ModelReader*>& readers) {
@@ -89,55 +135,102 @@ SceneModels Scene::Impl::makeModels(const std::vector<const ModelReader*>& reade
 const Frame& Scene::Impl::update(const FrameRequest& request) {
     const Stopwatch watch;
     pages_.publish(++frame_number_);
+    live_.publish();
     frame_.publish_ms = watch.ms();
     select(request);
     wantMissing();
-    if (request.prefetch) prefetch(request);
+    request.prefetch ? prefetch(request) : live_.forgetPrefetch();
+    pages_.setElsewhere(live_.bytes());
     pages_.load();
+    live_.load();
+    const size_t missing = pages_.missing() + live_.missing();
     frame_.raised = tolerance_.factor() > 1;
-    frame_.converged = pages_.missing() == 0 && !frame_.raised;
+    frame_.converged = missing == 0 && !frame_.raised;
     tolerance_.adapt({.same_request = last_.sameView(request),
-                      .blocked = pages_.blocked(),
-                      .missing = pages_.missing(),
-                      .used = used_bytes_,
-                      .budget = pages_.drawn().budget});
+                      .blocked = isBlocked(),
+                      .missing = missing,
+                      .used_share = usedShare()});
     frame_.settled = tolerance_.settled();
     last_ = request;
-    frame_.resident_bytes = pages_.ramBytes() + table_bytes_;
+    frame_.resident_bytes = pages_.ramBytes() + live_.bytes() + table_bytes_;
     frame_.device_bytes = pages_.deviceBytes();
-    frame_.bytes_read = pages_.bytesRead();
+    frame_.bytes_read = pages_.bytesRead() + live_.bytesRead();
     frame_.select_ms = watch.ms() - frame_.publish_ms;
     return frame_;
+}
+
+/// Something needed does not fit, and nobody has anything that is not needed.
+bool Scene::Impl::isBlocked() {
+    if (pages_.blocked()) return live_.release(kReleasedBytes) == 0;
+    if ((live_.shortOfTriangles() || !uploads_fit_) && pages_.releaseDevice(kReleasedBytes) == 0)
+        return true;
+    return live_.shortOfMemory() &&
+           live_.release(kReleasedBytes) + pages_.release(kReleasedBytes) == 0;
+}
+
+/// Of the memory of which this frame uses the larger part.
+double Scene::Impl::usedShare() const {
+    const bool has_sink = pages_.deviceBudget() > 0;
+    const size_t in_ram = live_.neededBytes() + (has_sink ? 0 : used_bytes_);
+    const double ram = double(in_ram) / double(pages_.ramBudget());
+    if (!has_sink) return ram;
+    // Meshes that are adapted do not use all of a sink.
+    const double device = double(used_bytes_) + double(uploads_.bytes()) / LiveUploads::kUsable;
+    return std::max(ram, device / double(pages_.deviceBudget()));
 }
 
 void Scene::Impl::select(const FrameRequest& request) {
     missing_.clear();
     missing_for_eye_.clear();
-    const double pixels = request.pixels * tolerance_.factor();
     frame_.tolerance_px = request.pixels;
     frame_.triangles = frame_.patch_count = used_bytes_ = 0;
-    for (uint32_t m = 0; m < models_.size(); ++m) {
-        SceneModel& model = *models_[m];
-        const View view(request.camera, request.size, model.reader.info().lattice);
-        if (frame_.models.size() <= m) frame_.models.emplace_back(view);
-        ModelFrame& out = frame_.models[m];
+    frame_.adapt_ms = 0;
+    for (uint32_t i = 0; i < parts_.size(); ++i) {
+        const View view(request.camera, request.size, parts_[i].reader->info().lattice);
+        if (frame_.models.size() <= i) frame_.models.emplace_back(view);
+        ModelFrame& out = frame_.models[i];
         out.view = view;
-        out.two_sided = mayBeInside(m, view);
-        Culling culling = request.culling;
-        culling.cone &= !out.two_sided;
-        model.refiner.select(view, pixels, culling, out.selection);
-        for (PageIndex page = 0; page < model.last_used.size(); ++page)
-            if (model.refiner.used(page)) {
-                model.last_used[page] = frame_number_;
-                used_bytes_ += model.drawn_bytes[page];
-            }
-        for (const PageRequest& r : out.selection.requests)
-            missing_.push_back({{m, r.page}, r.pixels});
-        describe(model, m, request.show_error, out);
-        frame_.tolerance_px = std::max(frame_.tolerance_px, out.selection.largest_px);
-        frame_.triangles += out.selection.triangles;
+        parts_[i].is_live ? adapt(parts_[i].index, request, out)
+                          : select(parts_[i].index, request, out);
         frame_.patch_count += out.patches.size();
     }
+    frame_.operations = live_.operations();
+}
+
+void Scene::Impl::select(uint32_t m, const FrameRequest& request, ModelFrame& out) {
+    SceneModel& model = *models_[m];
+    out.two_sided = mayBeInside(m, out.view);
+    Culling culling = request.culling;
+    culling.cone &= !out.two_sided;
+    model.refiner.select(out.view, request.pixels * tolerance_.factor(), culling, out.selection);
+    for (PageIndex page = 0; page < model.last_used.size(); ++page)
+        if (model.refiner.used(page)) {
+            model.last_used[page] = frame_number_;
+            used_bytes_ += model.drawn_bytes[page];
+        }
+    for (const PageRequest& r : out.selection.requests) missing_.push_back({{m, r.page}, r.pixels});
+    describe(model, m, request.show_error, out);
+    frame_.tolerance_px = std::max(frame_.tolerance_px, out.selection.largest_px);
+    frame_.triangles += out.selection.triangles;
+}
+
+void Scene::Impl::adapt(uint32_t i, const FrameRequest& request, ModelFrame& out) {
+    const Stopwatch watch;
+    const size_t taken = pages_.ramBytes() + live_.bytes();
+    const LiveFrame& live = live_.adapt(i,
+                                        {.view = &out.view,
+                                         .pixels = request.pixels * tolerance_.factor(),
+                                         .milliseconds = adapt_ms_ / double(live_.size()),
+                                         .most_triangles = uploads_.mostTriangles(i)},
+                                        pages_.ramBudget() - std::min(pages_.ramBudget(), taken));
+    frame_.adapt_ms += watch.ms();
+    frame_.tolerance_px = std::max(frame_.tolerance_px, live.largest_px);
+    if (i == 0) uploads_fit_ = true;
+    uploads_fit_ &= uploads_.update(i, live_.model(i).chunks());
+    const auto m = uint32_t(models_.size()) + i;
+    listChunks(live_.model(i).chunks(), m, out.view, request.culling, request.show_error,
+               out.patches);
+    for (const DrawPatch& patch : out.patches) frame_.triangles += patch.mesh->triangleCount();
 }
 
 /// Of all models, largest error first.
@@ -154,6 +247,15 @@ void Scene::Impl::prefetch(const FrameRequest& request) {
     const uint32_t turn = frame_number_ % kPrefetchFrames;
     if (turn == 0) ahead_ = pagesFor(cameraAhead(request), request, 1);
     if (turn == kPrefetchFrames / 2) next_level_ = pagesFor(request.camera, request, kNextLevel);
+    for (const Part& part : parts_) {
+        const bool next_level = turn == kPrefetchFrames / 2;
+        if (!part.is_live || (turn != 0 && !next_level)) continue;
+        live_.prefetch(part.index,
+                       View(next_level ? request.camera : cameraAhead(request), request.size,
+                            part.reader->info().lattice),
+                       request.pixels * tolerance_.factor() * (next_level ? kNextLevel : 1),
+                       next_level);
+    }
     for (const auto* pages : {&ahead_, &next_level_})
         for (const PageKey& key : *pages)
             if (!models_[key.model]->residency.resident(key.page)) pages_.want(key, Need::kLater);

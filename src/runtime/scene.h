@@ -1,7 +1,8 @@
 #pragma once
 // Models that are looked at: which of their pages are in memory, and what to draw in a frame. The
 // frame thread calls update() and draws; it never waits for a file. Whatever has been loaded, every
-// frame is a valid, crack-free cut of each model (residency.h).
+// frame is a valid, crack-free cut of each model (residency.h), or one mesh that is adapted
+// (live_model.h): models of both kinds may share a scene.
 //
 // All models share the budgets: of decoded pages in RAM and, where a renderer draws from memory of
 // its own, of that (page_pool.h). Pages that a frame needs are never evicted for others; where they
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "multires/draw_list.h"
+#include "multires/live_model.h"
 #include "multires/page_sink.h"
 #include "runtime/eye_side.h"
 #include "runtime/forest_refiner.h"
@@ -28,6 +30,10 @@ struct SceneSettings {
     /// What pages must be in to be drawn; must outlive the scene, and have room for pages alone.
     /// Null: they are drawn from RAM.
     PageSink* sink = nullptr;
+    /// Of models whose pages are not patches. Null: there are to be none.
+    OpenLive open_live = nullptr;
+    /// For adapting them, in a frame, about.
+    double adapt_ms = 4;
 };
 
 /// What the table of nodes and what is made of it take, about.
@@ -54,8 +60,8 @@ struct FrameRequest {
 struct ModelFrame {
     explicit ModelFrame(const View& v) : view(v) {}
     View view;
-    bool two_sided = false;  ///< the eye may be inside of a closed part
-    Selection selection;
+    bool two_sided = false;          ///< the eye may be inside of a closed part
+    Selection selection;             ///< empty of a mesh that is adapted
     std::vector<DrawPatch> patches;  ///< valid until the next update(); with a sink, without meshes
 };
 
@@ -69,16 +75,19 @@ struct Frame {
     bool settled = false;    ///< nothing is missing, at a tolerance that memory allows: as long as
                              ///< the view stays, so does what is drawn
     uint64_t triangles = 0, patch_count = 0;
+    uint32_t operations = 0;    ///< on meshes that are adapted
     size_t resident_bytes = 0;  ///< in RAM, tables included
     size_t device_bytes = 0;    ///< in the sink
     uint64_t bytes_read = 0;    ///< since the beginning
     double publish_ms = 0, select_ms = 0;
+    double adapt_ms = 0;  ///< of select_ms
 };
 
 class Scene {
 public:
     /// Models must outlive this. Loads the roots, waiting for them. Throws MemoryError, which says
-    /// how much is needed where, if they do not fit, and what reading throws.
+    /// how much is needed where, if they do not fit, and what reading throws; InputError for a
+    /// model that settings.open_live is to know, and does not.
     Scene(std::vector<const ModelReader*> models, const SceneSettings& settings);
     ~Scene();
 

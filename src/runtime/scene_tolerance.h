@@ -14,7 +14,7 @@ public:
         bool same_request = false;  ///< as the frame before
         bool blocked = false;       ///< something needed does not fit
         size_t missing = 0;         ///< pages needed that are on their way
-        size_t used = 0, budget = 0;
+        double used_share = 0;      ///< of memory
     };
 
     double factor() const { return factor_; }
@@ -28,7 +28,7 @@ public:
             too_fine_ = factor_;
             factor_ = std::min(factor_ * kRaise, kMostRaised);
         } else if (found.missing == 0) {
-            const double share = double(found.used) / double(found.budget);
+            const double share = found.used_share;
             const double lower = share < kPlenty ? kLowerFast : share < kComfortable ? kLower : 1;
             // In the view that stays what did not fit once is not tried again.
             if (factor_ * lower > too_fine_) factor_ = std::max(1.0, factor_ * lower);

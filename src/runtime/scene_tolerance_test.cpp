@@ -14,7 +14,7 @@ struct ToyScene {
     void frame(bool same) {
         const double bytes = std::ceil(full / std::pow(tolerance.factor(), power) / lump) * lump;
         const bool blocked = bytes > 1000;
-        tolerance.adapt({same, blocked, 0, size_t(std::min(bytes, 1000.0)), 1000});
+        tolerance.adapt({same, blocked, 0, std::min(bytes, 1000.0) / 1000});
     }
 };
 

@@ -9,6 +9,7 @@
 #include "base/check.h"
 #include "base/hash.h"
 #include "multires/cut.h"
+#include "runtime/live_settle.h"
 #include "runtime/patch_reader.h"
 
 namespace pietra {
@@ -280,20 +281,29 @@ std::optional<StandardPath> parseStandardPath(std::string_view name) {
     return StandardPath(found - std::begin(kNames));
 }
 
-Surface coarseSurface(std::span<const ModelReader* const> models) {
+Surface coarseSurface(std::span<const ModelReader* const> models, OpenLive open) {
     Surface surface;
     std::mutex mutex;
+    const auto triangles = uint64_t(kSurfaceTriangles / double(models.size()));
     for (const ModelReader* model : models) {
         const Lattice& lattice = model->info().lattice;
-        const Cut cut =
-            cutByTriangles(model->nodes(), uint64_t(kSurfaceTriangles / double(models.size())));
-        visitPatches(*model, cut.nodes, [&](NodeIndex node, const Mesh& mesh) {
-            const double error = double(model->nodes()[node].error) * lattice.step;
-            const std::lock_guard lock(mutex);
+        const auto add = [&](const Mesh& mesh, float error) {
             for (size_t i = 0; i < mesh.vertexCount(); ++i)
                 surface.points.push_back({lattice.toInput(mesh.position[i]),
-                                          Vec3d(decodeNormal(mesh.normal[i])), error});
-        });
+                                          Vec3d(decodeNormal(mesh.normal[i])),
+                                          double(error) * lattice.step});
+        };
+        if (model->hasPatches()) {
+            visitPatches(*model, cutByTriangles(model->nodes(), triangles).nodes,
+                         [&](NodeIndex node, const Mesh& mesh) {
+                             const std::lock_guard lock(mutex);
+                             add(mesh, model->nodes()[node].error);
+                         });
+        } else {
+            const std::unique_ptr<LiveModel> live = openLive(*model, open);
+            refineEvenly(*model, *live, triangles);
+            for (const LiveChunk& chunk : live->chunks()) add(chunk.mesh, chunk.error);
+        }
     }
     // Patches come in any order.
     const auto key = [](const Surface::Point& p) {

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "multires/live_model.h"
 #include "multires/standard_views.h"
 #include "runtime/camera_path.h"
 #include "store/model_reader.h"
@@ -37,8 +38,8 @@ struct Surface {
 };
 
 /// The vertices of a cut of some ten thousand triangles. Reads a few pages; throws what that
-/// throws.
-Surface coarseSurface(std::span<const ModelReader* const> models);
+/// throws. `open`: as of a scene (scene.h).
+Surface coarseSurface(std::span<const ModelReader* const> models, OpenLive open);
 
 /// 20 seconds; an inspection 45. `surface` must have points. A function of what is given.
 CameraPath standardPath(StandardPath path, const Surface& surface, UpAxis up,

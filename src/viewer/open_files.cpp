@@ -11,7 +11,6 @@
 
 #include "base/error.h"
 #include "base/hash.h"
-#include "runtime/patch_reader.h"
 
 namespace pietra {
 namespace fs = std::filesystem;
@@ -53,7 +52,6 @@ void OpenFiles::open(const std::string& path, bool build_now) {
     const std::string model = isModelFile(path) ? path : modelPathOf(path);
     if (model == path || isModelOf(model, path)) {
         models_.push_back(std::make_unique<ModelReader>(model));
-        requirePatches(*models_.back());
     } else if (build_now) {
         build(path);
     } else {

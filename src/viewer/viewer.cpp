@@ -170,8 +170,9 @@ void Viewer::showModels() {
     scene_.emplace(models, settings);
     const Box3d bounds = boundsOf(models);
     if (models_.empty())
-        control_ =
-            wholeScene(bounds, settings_.up ? *settings_.up : guessUpAxis(coarseSurface(models)));
+        control_ = wholeScene(bounds, settings_.up
+                                          ? *settings_.up
+                                          : guessUpAxis(coarseSurface(models, settings.open_live)));
     control_.setBounds(bounds);
     models_ = models;
     SDL_SetWindowTitle(screen_->window(),

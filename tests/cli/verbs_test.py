@@ -201,9 +201,25 @@ class Shown(VerbTest):
         coarse = self.extract("fine", "--error", str(info["max_error"] / 20))
         for names, vertices, triangles in (full, few, coarse):
             self.assertEqual(set(edge_uses(triangles)), {2})
-        run = self.run_pietra("render", "fine.pietra", "-o", "x.png")
-        self.assertEqual(run.returncode, 3)
-        self.assertIn("models of the method pmesh cannot be drawn yet", run.stderr)
+
+    def test_a_progressive_mesh_is_drawn_and_flown_through(self):
+        self.report("build", "statue.ply", "-o", "fine.pietra", "--method", "pmesh", "--report", "-",
+                    "--force")
+        full = self.render("full.png", "--pixels", "0")
+        fine = self.render("fine.png", models=("fine.pietra",))
+        all_of_it = self.render("all.png", "--pixels", "0", models=("fine.pietra",))
+        self.assertEqual(all_of_it["triangles"], full["triangles"])
+        self.assertLess(fine["triangles"], full["triangles"] / 2)
+        self.assertEqual(fine["tolerance_px"], 1)
+        self.assertEqual(self.run_pietra("compare", "all.png", "full.png", "--max-px", "1.5")
+                         .returncode, 0)
+        self.assertEqual(self.run_pietra("compare", "fine.png", "full.png", "--max-px", "1.5")
+                         .returncode, 0)
+        both = self.render("both.png", models=("fine.pietra", "statue.pietra"))
+        self.assertGreater(both["triangles"], fine["triangles"])
+        flight = self.report("bench", "fine.pietra", "statue.pietra", "--path", "orbit", "--frames",
+                             "8", "--size", "200x160", "--report", "-")
+        self.assertTrue(any(frame["operations"] > 0 for frame in flight["frames"]))
 
     def render(self, name, *arguments, models=("statue.pietra",)):
         return self.report("render", *models, "-o", name, "--size", "200x160", "--report", "-",

@@ -90,6 +90,7 @@ private:
         const Frame& frame = scene_.update(request);
         FrameRecord record;
         record.select_ms = frame.select_ms;
+        record.adapt_ms = frame.adapt_ms;
         record.load_ms = frame.publish_ms;
         if (renderer_) {
             record.draw_ms = draw(frame, patchesOf(frame));
@@ -98,6 +99,7 @@ private:
         record.ms = watch.ms();
         record.triangles = frame.triangles;
         record.patches = frame.patch_count;
+        record.operations = frame.operations;
         record.bytes_read = frame.bytes_read - bytes_read_;
         bytes_read_ = frame.bytes_read;
         record.resident_bytes = frame.resident_bytes;

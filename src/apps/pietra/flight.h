@@ -31,10 +31,12 @@ struct FlightSettings {
 struct FrameRecord {
     double seconds = 0;  ///< on the path
     double ms = 0, select_ms = 0, load_ms = 0, draw_ms = 0;
+    double adapt_ms = 0;  ///< of select_ms: meshes that are adapted
     double gpu_ms = 0;  ///< by the GPU's own clock; 0: not known
     /// To draw this view again with everything resident, and nothing else to do; 0: not measured.
     double static_ms = 0;
     uint64_t triangles = 0, patches = 0;
+    uint32_t operations = 0;                      ///< splits and collapses
     uint64_t bytes_read = 0;                      ///< in this frame
     size_t resident_bytes = 0, device_bytes = 0;  ///< of pages, in RAM and in graphics memory
     size_t process_bytes = 0;                     ///< of all that the process has in RAM

@@ -15,13 +15,14 @@ Json finite(double value) {
 Json frameJson(const FrameRecord& f) {
     return {{"ms", f.ms},
             {"select_ms", f.select_ms},
+            {"adapt_ms", f.adapt_ms},
             {"load_ms", f.load_ms},
             {"draw_ms", f.draw_ms},
             {"gpu_ms", f.gpu_ms},
             {"static_ms", f.static_ms},
             {"triangles", f.triangles},
             {"patches", f.patches},
-            {"operations", 0},
+            {"operations", f.operations},
             {"bytes_read", f.bytes_read},
             {"resident_bytes", f.resident_bytes},
             {"device_bytes", f.device_bytes},
@@ -42,6 +43,7 @@ Json distribution(const std::vector<double>& values) {
 struct Totals {
     std::vector<double> ms, ms_kept, gpu_ms, stalls;
     double triangles_kept = 0, kept_ms = 0, all_ms = 0, static_ms = 0;
+    double operations = 0, adapt_ms = 0;
     size_t converged = 0, process_bytes = 0;
     uint64_t bytes_read = 0;
 
@@ -51,6 +53,8 @@ struct Totals {
             all_ms += f.ms;
             if (f.gpu_ms > 0) gpu_ms.push_back(f.gpu_ms);
             static_ms += f.static_ms;
+            operations += f.operations;
+            adapt_ms += f.adapt_ms;
             if (f.static_ms > 0) stalls.push_back(f.ms / f.static_ms);
             converged += f.converged;
             bytes_read += f.bytes_read;
@@ -77,7 +81,8 @@ Json flightJson(const FlightRecord& record, double pixels, bool cold) {
                  {"seconds", record.seconds},
                  {"triangles_per_second",
                   totals.kept_ms > 0 ? 1e3 * totals.triangles_kept / totals.kept_ms : 0},
-                 {"operations_per_second", 0},
+                 {"operations_per_second",
+                  totals.adapt_ms > 0 ? 1e3 * totals.operations / totals.adapt_ms : 0},
                  {"largest_process_bytes", totals.process_bytes},
                  {"bytes_read", totals.bytes_read},
                  {"first_image_ms", record.first_image_ms},

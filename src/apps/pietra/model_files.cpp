@@ -1,14 +1,9 @@
 #include "apps/pietra/model_files.h"
 
-#include "runtime/patch_reader.h"
-
 namespace pietra {
 
 ModelFiles::ModelFiles(const std::vector<std::string>& paths) {
-    for (const std::string& path : paths) {
-        models.push_back(std::make_unique<ModelReader>(path));
-        requirePatches(*models.back());
-    }
+    for (const std::string& path : paths) models.push_back(std::make_unique<ModelReader>(path));
 }
 
 Box3d ModelFiles::bounds() const {

@@ -13,7 +13,7 @@ namespace pietra {
 struct ModelFiles {
     std::vector<std::unique_ptr<ModelReader>> models;
 
-    /// Opens all; throws what ModelReader and requirePatches() throw.
+    /// Opens all; throws what ModelReader throws.
     explicit ModelFiles(const std::vector<std::string>& paths);
     /// Of all models, in input coordinates.
     Box3d bounds() const;

@@ -21,6 +21,7 @@
 #include "base/parallel.h"
 #include "base/text.h"
 #include "extmem/page_cache.h"
+#include "methods/method_table.h"
 #include "runtime/standard_paths.h"
 
 namespace pietra {
@@ -118,7 +119,7 @@ void BenchVerb::declare(OptionSet& options) {
 
 CameraPath BenchVerb::path(const ModelFiles& files) const {
     if (const auto known = parseStandardPath(path_))
-        return standardPath(*known, coarseSurface(files.views()), camera_.up(), size_);
+        return standardPath(*known, coarseSurface(files.views(), openLive), camera_.up(), size_);
     return readCameraPath(path_, upVector(camera_.up()));
 }
 
@@ -139,6 +140,7 @@ FlightSettings BenchVerb::settings(const CameraPath& path) const {
     settings.compare = settings.draw != Draw::kNothing;
     settings.real_time = cold_;
     settings.scene.ram_bytes = size_t(ram_);
+    settings.scene.open_live = openLive;
     return settings;
 }
 

@@ -18,6 +18,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/text.h"
+#include "methods/method_table.h"
 #include "multires/standard_views.h"
 #include "render/offline/offline_picture.h"
 
@@ -181,6 +182,7 @@ OfflineSettings RenderVerb::settings(const ModelFiles& files) const {
     settings.renderer = renderer_ == "gl" ? DrawWith::kGl : DrawWith::kCpu;
     settings.samples = samples_ == "4" ? 4 : 1;
     settings.memory_bytes = size_t(ram_);
+    settings.open_live = openLive;
     settings.jobs = Limits{{}, jobs_}.threads();
     settings.shade.show = show_;
     settings.shade.two_sided = two_sided_;
@@ -204,7 +206,7 @@ Json RenderVerb::report(const OfflineStatistics& s, size_t resident_bytes) const
               {"draw", s.draw_ms},
               {"total", s.total_ms}}},
             {"resident_bytes", {{"ram", resident_bytes}, {"vram", s.device_bytes}}},
-            {"tolerance_px", pixels_}};
+            {"tolerance_px", s.tolerance_px}};
 }
 
 OfflinePicture RenderVerb::draw(const ModelFiles& files, const Camera& camera,
@@ -231,6 +233,9 @@ int RenderVerb::run(const RunContext& context) {
     const OfflinePicture drawn = draw(files, camera, context.progress);
     const size_t resident = peakResidentBytes();
     writePng(drawn.picture, output_, context.common.force);
+    if (drawn.statistics.tolerance_px > pixels_)
+        logWarning(fmt::format("--ram {} is too little for {} px: drawn at {:.3g} px",
+                               formatBytes(ram_), pixels_, drawn.statistics.tolerance_px));
     logInfo(fmt::format("{}: {} triangles in {} patches, {:.0f} ms", output_,
                         formatCount(double(drawn.statistics.triangles)), drawn.statistics.patches,
                         drawn.statistics.total_ms));

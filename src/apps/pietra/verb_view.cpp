@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "base/text.h"
 #include "io/triangle_source.h"
+#include "methods/method_table.h"
 #include "store/model_reader.h"
 #include "viewer/viewer.h"
 
@@ -79,6 +80,7 @@ int ViewVerb::run(const RunContext& context) {
     settings.pixels = pixels_;
     if (up_ != "auto") settings.up = up_ == "y" ? UpAxis::kY : UpAxis::kZ;
     settings.scene.ram_bytes = size_t(ram_);
+    settings.scene.open_live = openLive;
     settings.vram_bytes = size_t(vram_);
     settings.renderer = renderer_ == "auto" ? ViewerRenderer::kAuto
                         : renderer_ == "gl" ? ViewerRenderer::kGl

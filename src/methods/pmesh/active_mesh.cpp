@@ -151,6 +151,32 @@ bool ActiveMesh::orient(Star& star) const {
     return true;
 }
 
+bool ActiveMesh::mayBeNext(Star& star, uint32_t v) const {
+    constexpr int32_t kFar = 1 << 22;  // from all lattice points; sums do not overflow
+    const Operation& o = source_->at(record[v].next);
+    if (star.count == 0 || (!o.isDummy() && !orient(star))) return false;
+    const uint32_t n = star.neighbours(), l = o.rankLeft(), r = o.rankRight();
+    for (const int end : {0, 1}) {
+        const Vec3i p = glm::abs(vertex[v].position() + o.offset(end));
+        if (std::max({p.x, p.y, p.z}) > kFar) return false;
+    }
+    if (o.level != pulse[v].next_level) return false;
+    for (const uint32_t w : star.ring())
+        if (pulse[w].next_level <= o.level) return false;
+    if (o.isDummy()) return o.child[1] == record[v].last;
+    if ((l != kNoRank && l >= n) || (r != kNoRank && r >= n)) return false;
+    return star.closed ? l != kNoRank && r != kNoRank : l == kNoRank || r == kNoRank || r < l;
+}
+
+/// Its triangles change.
+void ActiveMesh::touch(const Star& star) {
+    if (chunk_touched.empty()) return;
+    for (uint32_t i = 0; i < star.count; ++i) {
+        const std::atomic_ref touched(chunk_touched[face[star.corner[i] >> 2].chunk()]);
+        if (!touched.load(kRelaxed)) touched.store(1, kRelaxed);
+    }
+}
+
 void ActiveMesh::link(uint32_t half_edge, uint32_t other) {
     if (half_edge != kNoCorner) setTwin(half_edge, other);
     if (other != kNoCorner) setTwin(other, half_edge);
@@ -181,6 +207,7 @@ void ActiveMesh::move(uint32_t v, const Star& star) {
     const VertexPulse before = pulse[v];
     const OperationId id = record[v].next;
     const Operation& o = source_->at(id);
+    touch(star);
     vertex[v].moveBy(o.offset(0));
     setLast(v, id);
     setNext(v, o.child[0]);
@@ -191,6 +218,7 @@ void ActiveMesh::moveBack(uint32_t v, const Star& star) {
     const VertexPulse before = pulse[v];
     const OperationId id = record[v].last;
     const Operation& o = source_->at(id);
+    touch(star);
     vertex[v].moveBy(-o.offset(0));
     setLast(v, o.child[1]);
     setNext(v, id);
@@ -201,12 +229,9 @@ bool ActiveMesh::apply(uint32_t v) {
     const Operation& o = source_->at(record[v].next);
     Star star;
     gatherStars({&v, 1}, &star, [](uint32_t) {});
-    if (!orient(star)) return false;
+    if (!mayBeNext(star, v)) return false;
     if (o.isDummy()) return move(v, star), true;
     const uint32_t faces = (o.rankLeft() != kNoRank) + (o.rankRight() != kNoRank);
-    for (const uint32_t rank : {o.rankLeft(), o.rankRight()})
-        if (rank != kNoRank && rank >= star.neighbours()) return false;
-    if (star.closed && faces < 2) return false;
     const uint32_t u = uint32_t(vertexCount()), first_face = uint32_t(faceCount());
     resize(u + 1, first_face + faces);
     split(v, star, u, {first_face, first_face + 1});
@@ -226,6 +251,8 @@ std::array<uint32_t, 2> ActiveMesh::split(uint32_t v, const Star& star, uint32_t
     };
     const uint32_t vl = has_left ? star.neighbour[l] : 0;
     const uint32_t vr = has_right ? star.neighbour[r] : 0;
+    touch(star);
+    const uint32_t chunk = face[star.corner[0] >> 2].chunk();
 
     const uint32_t begin = has_right ? r : 0, end = has_left ? l : n;
     for (uint32_t i = begin, left = end >= begin ? end - begin : n - begin + end; left > 0;
@@ -237,6 +264,7 @@ std::array<uint32_t, 2> ActiveMesh::split(uint32_t v, const Star& star, uint32_t
     if (has_left) {
         const uint32_t of_u = triangle(l - 1), of_v = triangle(l);
         face[fl >> 2].vertex = {v, u, vl, v};
+        face[fl >> 2].left[3] = chunk;
         link(fl, has_right ? fr : kNoCorner);
         link(fl + 1, of_u == kNoCorner ? kNoCorner : previousCorner(of_u));
         link(fl + 2, of_v);
@@ -245,6 +273,7 @@ std::array<uint32_t, 2> ActiveMesh::split(uint32_t v, const Star& star, uint32_t
     if (has_right) {
         const uint32_t of_v = triangle(r - 1), of_u = triangle(r);
         face[fr >> 2].vertex = {u, v, vr, u};
+        face[fr >> 2].left[3] = chunk;
         if (!has_left) link(fr, kNoCorner);
         link(fr + 1, of_v == kNoCorner ? kNoCorner : previousCorner(of_v));
         link(fr + 2, of_u);
@@ -326,6 +355,8 @@ std::array<uint32_t, 2> ActiveMesh::merge(uint32_t v, const Star& star, uint32_t
     VertexPulse& b = pulse[u];
     const VertexPulse before = a;
     const bool open = !star.closed || !other.closed;
+    touch(star);
+    touch(other);
     const uint32_t n = other.count, ring = other.neighbours();
     uint32_t at = 0;
     while (other.neighbour[at] != v) ++at;
@@ -432,7 +463,8 @@ void ActiveMesh::moveFaces(const std::vector<uint32_t>& from, const std::vector<
     std::vector<uint32_t> new_place(faceCount() - count);
     for (size_t i = 0; i < from.size(); ++i) new_place[from[i] - count] = to[i];
     parallelForSlices(from.size(), kGrain, [&](size_t begin, size_t end) {
-        for (size_t i = begin; i < end; ++i)
+        for (size_t i = begin; i < end; ++i) {
+            face[to[i]].left[3] = face[from[i]].chunk();
             for (uint32_t k = 0; k < 3; ++k) {
                 const uint32_t old_corner = 4 * from[i] + k, new_corner = 4 * to[i] + k;
                 const uint32_t v = vertexAt(old_corner), t = twinOf(old_corner);
@@ -444,6 +476,7 @@ void ActiveMesh::moveFaces(const std::vector<uint32_t>& from, const std::vector<
                     setTwin(new_corner, 4 * new_place[(t >> 2) - count] + (t & 3));
                 }
             }
+        }
     });
 }
 

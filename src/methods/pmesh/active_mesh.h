@@ -30,7 +30,8 @@ namespace pietra::pmesh {
 /// vertex in the next triangle counter-clockwise, or kNoCorner.
 struct alignas(32) ActiveFace {
     std::array<uint32_t, 4> vertex{};
-    std::array<uint32_t, 4> left{};  ///< the fourth is padding
+    std::array<uint32_t, 4> left{};             ///< the fourth is another matter: its chunk
+    uint32_t chunk() const { return left[3]; }  ///< that it is drawn in (draw_chunks.h)
     bool operator==(const ActiveFace&) const = default;
 };
 
@@ -60,11 +61,12 @@ struct alignas(16) VertexPulse {
 
 /// What an operation on a vertex needs.
 struct alignas(16) VertexRecord {
-    OperationId next;           ///< its next split, or kNoOperation
-    OperationId last;           ///< the split it came from last, or kNoOperation
-    OperationId undo_last = 0;  ///< if it is the u of a split: what v had before
-    uint16_t undo_normal = 0;   ///< the same
-    uint16_t provisional = 0;   ///< its split's criteria are a Reference's
+    OperationId next;                        ///< its next split, or kNoOperation
+    OperationId last;                        ///< the split it came from last, or kNoOperation
+    OperationId undo_last = 0;               ///< if it is the u of a split: what v had before
+    uint16_t undo_normal = 0;                ///< the same
+    uint16_t provisional = 0;                ///< 1: its split's criteria are a Reference's
+    static constexpr uint16_t kRefused = 2;  ///< its split does not fit its star: it never splits
 };
 
 /// The spheres and errors that a scan for work compares (criterion.h): those of the next split,
@@ -109,6 +111,8 @@ public:
     std::vector<VertexCriteria> criteria;
     std::vector<VertexRecord> record;
     std::vector<ActiveFace> face;
+    /// One a chunk: faces of it, or their vertices, have changed. Empty if nobody asks.
+    std::vector<uint8_t> chunk_touched;
 
     const ProgressiveMesh& source() const { return *source_; }
     size_t vertexCount() const { return vertex.size(); }
@@ -134,6 +138,8 @@ public:
     /// Finds from where ranks count in the star of a vertex that is to split: where it is closed,
     /// from the neighbour of the least name. False if it has too many neighbours.
     [[nodiscard]] bool orient(Star& star) const;
+    /// Orients it. False if v cannot split so: always true of models without damage.
+    [[nodiscard]] bool mayBeNext(Star& star, uint32_t v) const;
     /// The last split of `u` made it.
     bool isNewEnd(uint32_t u) const {
         return pulse[u].last_level != 0 && pulse[u].name == source_->nameOf(record[u].last);
@@ -204,6 +210,7 @@ private:
     void addAround(uint32_t v, uint32_t weight) {
         std::atomic_ref(pulse[v].around).fetch_add(weight, std::memory_order_relaxed);
     }
+    void touch(const Star& star);
     void changeAround(uint32_t v, const Star& star, const VertexPulse& before);
     void changeAround(const Star& star, const VertexPulse& before, VertexPulse& a, uint32_t of_a,
                       VertexPulse& b, uint32_t of_b);

@@ -5,6 +5,7 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "methods/pmesh/criterion_scan.h"
 
 namespace pietra::pmesh {
@@ -28,20 +29,27 @@ void forSome(std::vector<T>& list, Body&& body) {
 
 }  // namespace
 
-PassCounts Adaption::frame(const Criterion& criterion, int most_passes) {
+PassCounts Adaption::frame(const Criterion& criterion, const FrameLimits& limits) {
+    const Stopwatch watch;
+    const uint32_t refused_before = refused_;
     criterion_ = criterion;
     scan();
     PassCounts all;
-    for (int pass = 0; pass < most_passes; ++pass) {
-        findSplits();
+    for (bool last = false; !last;) {
+        last = int(all.passes) + 1 >= limits.passes || watch.ms() >= limits.milliseconds;
+        findSplits(limits);
         merge_.clear();
-        if (split_.empty() || pass + 1 == most_passes) findMerges();
-        if (split_.empty() && merge_.empty()) break;
+        if (split_.empty() || last) findMerges(limits.operations);
+        all.finished = split_.empty() && merge_.empty() && may_merge_.empty();
+        if (all.finished) break;
         apply();
         all.splits += uint32_t(split_.size());
         all.merges += uint32_t(merge_.size());
         ++all.passes;
     }
+    all.short_of_room = short_of_room_;
+    // What does not fit is found again in each frame.
+    all.merges -= std::min(all.merges, refused_ - refused_before);
     listWaiting();
     tidy();
     since_sort_ += all.operations();
@@ -78,6 +86,10 @@ uint64_t Adaption::withoutProvisional(size_t w, uint64_t needed) {
     for (uint64_t bits = needed; bits != 0; bits &= bits - 1) {
         const uint32_t v = uint32_t(64 * w + size_t(std::countr_zero(bits)));
         if (!mesh_.record[v].provisional) continue;
+        if (mesh_.record[v].provisional == VertexRecord::kRefused) {
+            needed &= ~(bits & (0 - bits));
+            continue;
+        }
         const bool is_loaded = mesh_.isNextLoaded(v);
         if (is_loaded) {
             mesh_.updateCriteria(v);
@@ -99,13 +111,24 @@ void Adaption::mark(uint32_t v) {
 }
 
 void Adaption::maySplit(uint32_t v) {
-    if (mesh_.isNextLoaded(v)) may_split_.insert(v);
+    if (mesh_.isNextLoaded(v) && mesh_.record[v].provisional != VertexRecord::kRefused)
+        may_split_.insert(v);
 }
 
-void Adaption::findSplits() {
+/// Leaves the list's elements from there on for the next pass.
+void Adaption::postpone(size_t from, VertexSet& set) {
+    for (size_t i = from; i < list_.size(); ++i) set.insert(list_[i]);
+    list_.resize(std::min(from, list_.size()));
+}
+
+void Adaption::findSplits(const FrameLimits& limits) {
     for (fresh_.take(list_); !list_.empty(); fresh_.take(list_))
         forSome(list_, [&](Some some, size_t) { findSplits(some); });
     may_split_.take(list_);
+    const size_t used = mesh_.vertexCount() - free_vertex_.size();
+    const size_t room = limits.vertices - std::min(limits.vertices, used);
+    short_of_room_ = list_.size() > room;
+    postpone(std::min(room, limits.operations), may_split_);
     placeSplits();
 }
 
@@ -181,10 +204,11 @@ void Adaption::prefetchOtherEnds(Some vertices) const {
             __builtin_prefetch(&mesh_.pulse[w]);
 }
 
-void Adaption::findMerges() {
+void Adaption::findMerges(size_t most) {
     findCandidates();
     none_marked_ = marked_.empty();
     may_merge_.take(list_);
+    postpone(most, may_merge_);
     merge_.resize(list_.size());
     forSome(list_, [&](Some some, size_t first) {
         findMerges(some, std::span(merge_).subspan(first, some.size()));
@@ -288,6 +312,12 @@ void Adaption::applySplits(std::span<Split> splits) {
         Split& s = splits[i];
         const Operation& o = source.at(mesh_.record[s.v].next);
         marked_.erase(s.v);
+        if (!mesh_.mayBeNext(stars[i], s.v)) {
+            mesh_.record[s.v].provisional = VertexRecord::kRefused;
+            s = {s.v, kNoCorner, {kNoCorner, kNoCorner}};
+            ++refused_;
+            continue;
+        }
         uint32_t marked = 0;
         for (uint32_t j = 0; j < stars[i].neighbours(); ++j)
             marked |= uint32_t(marked_.contains(stars[i].neighbour[j])) << j;
@@ -296,13 +326,24 @@ void Adaption::applySplits(std::span<Split> splits) {
             s = {s.v, kNoCorner, {kNoCorner, kNoCorner}};
             wakeAround(stars[i], s.v, marked);
         } else {
-            CHECK(mesh_.orient(stars[i]));
             const auto [at_v, at_u] = mesh_.split(s.v, stars[i], s.u, s.face);
             if (o.rankLeft() == kNoRank || o.rankRight() == kNoRank) s.face[1] = kNoCorner;
             wakeAround(stars[i], s.v, at_v & marked);
             wakeAround(stars[i], s.u, at_u & marked);
         }
     }
+}
+
+/// No other around merges at the same time.
+bool Adaption::isAlone(const Merge& m, const Star& star, const Star& other) const {
+    if (star.count == 0 || other.count == 0) return false;
+    const uint16_t level = mesh_.pulse[m.v].last_level;
+    const auto ring = other.ring();
+    if (m.u != m.v && std::find(ring.begin(), ring.end(), m.v) == ring.end()) return false;
+    for (const Star* s : {&star, &other})
+        for (const uint32_t w : s->ring())
+            if (w != m.u && w != m.v && mesh_.pulse[w].last_level == level) return false;
+    return true;
 }
 
 void Adaption::applyMerges(std::span<Merge> merges) {
@@ -324,6 +365,11 @@ void Adaption::applyMerges(std::span<Merge> merges) {
     }
     for (size_t i = 0; i < count; ++i) {
         Merge& m = merges[i];
+        if (!isAlone(m, stars[i], stars[count + i])) {
+            m = {kNoCorner, kNoCorner, {kNoCorner, kNoCorner}};
+            ++refused_;
+            continue;
+        }
         if (m.u == m.v) {
             mesh_.moveBack(m.v, stars[i]);
             m.u = kNoCorner;

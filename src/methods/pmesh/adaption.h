@@ -25,7 +25,9 @@
 // The arrays after each pass are the same for any number of threads. A frame with nothing to do
 // reads 24 bytes a vertex. Not thread-safe.
 
+#include <atomic>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -38,7 +40,17 @@ namespace pietra::pmesh {
 struct PassCounts {
     uint32_t splits = 0, merges = 0;  ///< dummies included
     uint32_t passes = 0;              ///< that found something to do
+    bool finished = false;       ///< nothing is left to do with the nodes and the room there is
+    bool short_of_room = false;  ///< there are no vertices for all splits
     uint32_t operations() const { return splits + merges; }
+};
+
+/// What a frame may take; it does one pass in any case.
+struct FrameLimits {
+    int passes = 1 << 30;
+    double milliseconds = std::numeric_limits<double>::infinity();  ///< then no pass begins
+    size_t operations = ~size_t(0);                                 ///< of a pass, of each kind
+    size_t vertices = ~size_t(0);                                   ///< of the mesh, at any time
 };
 
 class Adaption {
@@ -47,13 +59,18 @@ public:
     explicit Adaption(const ProgressiveMesh& mesh, const References* references = nullptr)
         : mesh_(mesh, references) {}
 
-    /// A frame of at most so many passes; ends with the first that finds nothing to do.
-    PassCounts frame(const Criterion& criterion, int most_passes);
+    /// Ends with the first pass that finds nothing to do.
+    PassCounts frame(const Criterion& criterion, const FrameLimits& limits);
+    PassCounts frame(const Criterion& criterion, int most_passes) {
+        return frame(criterion, FrameLimits{.passes = most_passes});
+    }
     PassCounts pass(const Criterion& criterion) { return frame(criterion, 1); }
     /// Passes until nothing is left to do.
     PassCounts settle(const Criterion& criterion) { return frame(criterion, 1 << 30); }
 
     const ActiveMesh& mesh() const { return mesh_; }
+    /// Between frames: for what is drawn of it.
+    ActiveMesh& mesh() { return mesh_; }
 
     /// An operation that is marked at the end of the last frame, or that is to be known.
     struct Waiting {
@@ -61,6 +78,9 @@ public:
         bool is_needed;  ///< or only before one that is
     };
     std::span<const Waiting> waiting() const { return waiting_; }
+
+    /// Operations found not to fit the mesh, so far: the model is damaged. They are left undone.
+    uint32_t refused() const { return refused_; }
 
 private:
     struct Split {
@@ -78,13 +98,15 @@ private:
     void scan();
     uint64_t withoutProvisional(size_t w, uint64_t needed);
     void maySplit(uint32_t v);
-    void findSplits();
+    void findSplits(const FrameLimits& limits);
     void findSplits(Some fresh);
+    void postpone(size_t from, VertexSet& set);
     void placeSplits();
     void mark(uint32_t v);
     void findCandidates();
     void setBlocked(uint32_t u, bool blocked);
-    void findMerges();
+    void findMerges(size_t most);
+    bool isAlone(const Merge& merge, const Star& star, const Star& other) const;
     void findMerges(Some candidates, std::span<Merge> merges);
     void prefetchOtherEnds(Some vertices) const;
     bool anyMarkedAround(uint32_t v) const;
@@ -112,6 +134,8 @@ private:
     std::vector<Merge> merge_;
     std::vector<uint32_t> free_vertex_, free_face_;
     size_t since_sort_ = 0;  ///< operations
+    bool short_of_room_ = false;
+    std::atomic<uint32_t> refused_{0};
 };
 
 }  // namespace pietra::pmesh

@@ -1,22 +1,24 @@
 #include "methods/pmesh/resident_nodes.h"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "base/check.h"
+#include "base/parallel.h"
 
 namespace pietra::pmesh {
 
 ResidentNodes::ResidentNodes(NodeForest forest, uint32_t most)
-    : row_(std::move(forest.row)), state_(row_.size()), reference_level_(most), free_place_(most) {
+    : row_(std::move(forest.row)),
+      state_(row_.size()),
+      most_(std::min(most, uint32_t(row_.size()))) {
     mesh_.lattice = forest.lattice;
     mesh_.base_vertex = std::move(forest.base_vertex);
     mesh_.base_triangle = std::move(forest.base_triangle);
     mesh_.base_operation = std::move(forest.base_operation);
-    mesh_.operation.resize(size_t(most) * kNodeSlots);
+    // Memory that is not touched yet costs nothing, and nothing has to move later.
+    mesh_.operation.reserve(size_t(most_) * kNodeSlots);
     mesh_.place_of_node.assign(row_.size(), ProgressiveMesh::kNotLoaded);
-    std::iota(free_place_.rbegin(), free_place_.rend(), 0u);
     for (NodeIndex n = 0; n < row_.size(); ++n)
         if (row_[n].parent == kNoNode) {
             state_[n].is_pinned = true;
@@ -35,10 +37,15 @@ Reference ResidentNodes::referenceTo(OperationId id) const {
 void ResidentNodes::pin(const ActiveMesh& mesh) {
     for (NodeIndex n = 0; n < row_.size(); ++n) state_[n].is_pinned = row_[n].parent == kNoNode;
     const auto base = uint32_t(mesh_.base_vertex.size());
-    for (const VertexPulse& p : mesh.pulse)
-        if (p.name >= base) state_[nodeOf(p.name - base)].is_pinned = true;
-    for (const VertexRecord& r : mesh.record)
-        if (r.last != kNoOperation) state_[nodeOf(r.last)].is_pinned = true;
+    const auto pinNodeOf = [&](OperationId o) {
+        std::atomic_ref(state_[nodeOf(o)].is_pinned).store(true, std::memory_order_relaxed);
+    };
+    parallelForSlices(mesh.vertexCount(), 4096, [&](size_t begin, size_t end) {
+        for (size_t v = begin; v < end; ++v) {
+            if (mesh.pulse[v].name >= base) pinNodeOf(mesh.pulse[v].name - base);
+            if (mesh.record[v].last != kNoOperation) pinNodeOf(mesh.record[v].last);
+        }
+    });
     // Rows lie parents before children.
     for (NodeIndex n = NodeIndex(row_.size()); n-- > 0;)
         if (state_[n].is_pinned && row_[n].parent != kNoNode)
@@ -47,12 +54,13 @@ void ResidentNodes::pin(const ActiveMesh& mesh) {
 
 void ResidentNodes::note(const Adaption& adaption) {
     ++frame_;
+    victims_.reset();
     pin(adaption.mesh());
     std::vector<NodeIndex> asked;
     for (const Adaption::Waiting& w : adaption.waiting())
         if (mesh_.isLoaded(w.operation)) {
             state_[nodeOf(w.operation)].is_in_use = true;
-        } else {
+        } else if (!state_[nodeOf(w.operation)].is_bad) {
             asked.push_back(nodeOf(w.operation));
         }
     std::sort(asked.begin(), asked.end());
@@ -69,28 +77,64 @@ void ResidentNodes::note(const Adaption& adaption) {
 std::vector<NodeIndex> ResidentNodes::requests(size_t most) const {
     std::vector<NodeIndex> nodes;
     for (const NodeIndex n : asked_)
-        if (!isLoaded(n)) nodes.push_back(n);
+        if (!isLoaded(n) && !state_[n].is_bad) nodes.push_back(n);
     std::stable_sort(nodes.begin(), nodes.end(),
                      [&](NodeIndex a, NodeIndex b) { return state_[a].asked > state_[b].asked; });
     nodes.resize(std::min(most, nodes.size()));
     return nodes;
 }
 
-/// Of those that may leave, that which was not used for longest.
-bool ResidentNodes::makeRoom() {
-    if (!free_place_.empty()) return true;
-    NodeIndex oldest = kNoNode;
-    for (NodeIndex n = 0; n < row_.size(); ++n) {
-        const State& s = state_[n];
-        if (!isLoaded(n) || s.is_pinned || s.loaded_children > 0 || s.last_used == frame_) continue;
-        if (oldest == kNoNode || s.last_used < state_[oldest].last_used) oldest = n;
+std::vector<NodeIndex> ResidentNodes::prefetch(const Criterion& criterion, size_t most) const {
+    std::vector<NodeIndex> nodes;
+    size_t room = most_ - std::min<size_t>(most_, loaded_);
+    for (NodeIndex n = 0; n < row_.size(); ++n)
+        room += mayLeave(n) && state_[n].last_used + kFramesKept < frame_;
+    for (NodeIndex n = 0; n < row_.size() && nodes.size() < std::min(most, room); ++n) {
+        const NodeRow& row = row_[n];
+        if (!isLoaded(n) && !state_[n].is_bad && isLoaded(row.parent) &&
+            criterion.needs(row.centre, row.error, row.radius))
+            nodes.push_back(n);
     }
-    return oldest != kNoNode && evict(oldest);
+    return nodes;
+}
+
+bool ResidentNodes::evictOldest() {
+    if (!victims_) {
+        victims_.emplace();
+        for (NodeIndex n = 0; n < row_.size(); ++n)
+            if (mayLeave(n)) victims_->push_back(n);
+        std::stable_sort(victims_->begin(), victims_->end(), [&](NodeIndex a, NodeIndex b) {
+            return state_[a].last_used > state_[b].last_used;
+        });
+    }
+    while (!victims_->empty()) {
+        const NodeIndex n = victims_->back();
+        victims_->pop_back();
+        if (mayLeave(n) && evict(n)) return true;
+    }
+    return false;
+}
+
+bool ResidentNodes::makeRoom() {
+    while (loaded_ >= most_)
+        if (!evictOldest()) return false;
+    if (free_place_.empty()) {
+        free_place_.push_back(uint32_t(reference_level_.size()));
+        reference_level_.emplace_back();
+        mesh_.operation.resize(reference_level_.size() * kNodeSlots);
+    }
+    return true;
 }
 
 bool ResidentNodes::arrive(NodeIndex index, const OperationNode& node) {
     const NodeIndex parent = row_[index].parent;
-    if (isLoaded(index) || (parent != kNoNode && !isLoaded(parent)) || !makeRoom()) return false;
+    if (isLoaded(index) || (parent != kNoNode && !isLoaded(parent))) return false;
+    if (parent != kNoNode) {
+        const size_t side = row_[parent].child[0] == index ? 0 : 1;
+        const auto& levels = reference_level_[mesh_.place_of_node[parent]][side];
+        if (levels.size() != node.frontier) return giveUp(index), false;
+    }
+    if (!makeRoom()) return false;
     const uint32_t place = free_place_.back();
     free_place_.pop_back();
     mesh_.place_of_node[index] = place;

@@ -13,11 +13,14 @@
 //     whose splits nobody asks for.
 //   - Longest asked for comes first, so every node that is asked for in each frame arrives.
 //   - There are never more than `most` nodes. Where more are required, in use or asked for, than
-//     that, detailFactor() grows until they fit, and goes back only when well below: it settles.
+//     that, a detail factor grows until they fit, and goes back only when well below: it settles.
+//   - A node that is damaged, or does not fit its parent, is never asked for again, nor what is
+//     below it.
 //
-// Deterministic in the order of calls. Memory: most * 682 * 28 bytes, 30 bytes a node of the file.
-// Not thread-safe.
+// Deterministic in the order of calls. Memory: kNodeBytes for each node there has been at a time,
+// 50 bytes a node of the file. Not thread-safe.
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,26 +29,18 @@
 
 namespace pietra::pmesh {
 
-/// What tolerances are multiplied by; shared by all models that share a memory.
-class DetailFactor {
-public:
-    double value() const { return value_; }
-    void update(size_t required, size_t most) {
-        if (required > most) {
-            value_ *= 1.05;
-        } else if (double(required) < 0.85 * double(most)) {
-            value_ = std::max(value_ / 1.02, 1.0);
-        }
-    }
-
-private:
-    double value_ = 1;
-};
+/// What a node takes, with what it knows of its children.
+inline constexpr size_t kNodeBytes = kNodeSlots * (sizeof(Operation) + 4);
 
 class ResidentNodes : public References {
 public:
-    /// Of `forest`, whose nodes but the roots may be empty. CHECKs that roots fit.
+    /// Of `forest`, whose nodes but the roots may be empty. CHECKs that roots fit. `most` will not
+    /// grow.
     ResidentNodes(NodeForest forest, uint32_t most);
+    /// From now on; no node leaves for that.
+    void setMost(size_t most) {
+        most_ = uint32_t(std::min(most, mesh_.operation.capacity() / kNodeSlots));
+    }
 
     /// As far as it is there. For Adaption, with this as its references.
     const ProgressiveMesh& mesh() const { return mesh_; }
@@ -55,11 +50,19 @@ public:
     void note(const Adaption& adaption);
     /// At most so many, none loaded, in the order of need.
     std::vector<NodeIndex> requests(size_t most) const;
-    /// A node without faults. False, and nothing done, where it has no room or is not wanted: its
-    /// parent has left.
+    /// At most so many of those that this would need first, whose parents are there, and which fit
+    /// without those used lately.
+    std::vector<NodeIndex> prefetch(const Criterion& criterion, size_t most) const;
+    /// A node without faults by itself. False, and nothing done, where it has no room or is not
+    /// wanted: its parent has left, or it does not fit it.
     [[nodiscard]] bool arrive(NodeIndex index, const OperationNode& node);
+    /// It is damaged.
+    void giveUp(NodeIndex index) { state_[index].is_bad = true; }
+    bool isGivenUp(NodeIndex index) const { return state_[index].is_bad; }
     /// False, and nothing done, if it must stay.
     [[nodiscard]] bool evict(NodeIndex index);
+    /// Of those that may leave, that which was not used for longest; false if there is none.
+    bool evictOldest();
 
     bool isLoaded(NodeIndex n) const {
         return mesh_.place_of_node[n] != ProgressiveMesh::kNotLoaded;
@@ -74,10 +77,16 @@ private:
         uint8_t loaded_children = 0;
         bool is_pinned = false;  ///< must stay
         bool is_in_use = false;  ///< by what waits for others
+        bool is_bad = false;
     };
+    static constexpr uint32_t kFramesKept = 60;  ///< for what is only prefetched
 
     void pin(const ActiveMesh& mesh);
     bool makeRoom();
+    bool mayLeave(NodeIndex n) const {
+        const State& s = state_[n];
+        return isLoaded(n) && !s.is_pinned && s.last_used != frame_;
+    }
 
     ProgressiveMesh mesh_;
     std::vector<NodeRow> row_;
@@ -85,6 +94,8 @@ private:
     std::vector<std::array<std::vector<uint16_t>, 2>> reference_level_;  // a place
     std::vector<uint32_t> free_place_;
     std::vector<NodeIndex> asked_;
+    std::optional<std::vector<NodeIndex>> victims_;  // of this frame, the last one first
+    uint32_t most_;
     uint32_t frame_ = 0;
     size_t loaded_ = 0, required_ = 0;
 };

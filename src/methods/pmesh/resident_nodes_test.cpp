@@ -39,6 +39,22 @@ public:
     size_t arrived = 0;
 };
 
+/// What tolerances are multiplied by.
+class DetailFactor {
+public:
+    double value() const { return value_; }
+    void update(size_t required, size_t most) {
+        if (required > most) {
+            value_ *= 1.05;
+        } else if (double(required) < 0.85 * double(most)) {
+            value_ = std::max(value_ / 1.02, 1.0);
+        }
+    }
+
+private:
+    double value_ = 1;
+};
+
 class Nodes : public testing::Test {
 public:
     static constexpr uint32_t kPlenty = 1000;

@@ -12,6 +12,7 @@
 #include "base/text.h"
 #include "render/offline/batch_drawer.h"
 #include "runtime/eye_side.h"
+#include "runtime/live_settle.h"
 #include "runtime/patch_reader.h"
 
 namespace pietra {
@@ -67,7 +68,9 @@ public:
         const auto drawer =
             make(models_[0].view, models_[0].reader->info().lattice,
                  {settings_.samples, settings_.shade, settings_.culling.occlusion, batch_bytes_});
-        for (uint32_t m = 0; m < models_.size(); ++m) drawModel(m, *drawer);
+        result_.statistics.tolerance_px = settings_.pixels;
+        for (uint32_t m = 0; m < models_.size(); ++m)
+            models_[m].reader->hasPatches() ? drawModel(m, *drawer) : drawLive(m, *drawer);
         result_.picture = drawer->finish();
         progress_.endStage();
         report(drawer->statistics());
@@ -77,6 +80,7 @@ public:
 
 private:
     void select(SceneModel& model) const {
+        if (!model.reader->hasPatches()) return;
         Culling culling = settings_.culling;
         double pixels = settings_.pixels;
         if (pixels == 0) {
@@ -115,7 +119,10 @@ private:
         const size_t least = fixed_bytes_ + batch;
         if (least > settings_.memory_bytes)
             throw MemoryError(fmt::format("drawing this needs {} at least", formatBytes(least)));
-        const size_t spare = settings_.memory_bytes - least;
+        size_t spare = settings_.memory_bytes - least;
+        const auto is_live = [](const SceneModel& model) { return !model.reader->hasPatches(); };
+        if (std::any_of(models_.begin(), models_.end(), is_live))
+            spare -= live_bytes_ = spare / 4 * 3;
         batch_bytes_ = onGpu() ? std::min(batch + spare, std::max(batch, kLargestGlBatch))
                                : std::min(spare, kLargestBatch);
         result_.statistics.resident_bytes = fixed_bytes_;
@@ -137,6 +144,28 @@ private:
             });
         result_.statistics.load_ms += times.load_ms;
         result_.statistics.decode_ms += times.decode_ms;
+    }
+
+    void drawLive(uint32_t m, BatchDrawer& drawer) {
+        const SceneModel& model = models_[m];
+        drawer.setModel(model.view, model.reader->info().lattice);
+        const Stopwatch watch;
+        const std::unique_ptr<LiveModel> live = openLive(*model.reader, settings_.open_live);
+        OfflineStatistics& statistics = result_.statistics;
+        statistics.tolerance_px =
+            std::max(statistics.tolerance_px,
+                     settle(*model.reader, *live, model.view, settings_.pixels, live_bytes_));
+        statistics.resident_bytes =
+            std::max(statistics.resident_bytes, fixed_bytes_ + live->bytes());
+        statistics.load_ms += watch.ms();
+        std::vector<DrawPatch> list;
+        listChunks(live->chunks(), m, model.view, settings_.culling,
+                   settings_.shade.show == Show::kError, list);
+        for (DrawPatch& patch : list) {
+            std::vector<Mesh> mesh{*patch.mesh};
+            patch.mesh = mesh.data();
+            drawer.add(std::move(mesh), {patch});
+        }
     }
 
     DrawPatch describe(uint32_t m, NodeIndex index, const Mesh& mesh) const {
@@ -164,7 +193,7 @@ private:
     const PictureSize size_;
     Progress& progress_;
     std::vector<SceneModel> models_;
-    size_t fixed_bytes_ = 0, batch_bytes_ = 0;
+    size_t fixed_bytes_ = 0, batch_bytes_ = 0, live_bytes_ = 0;
     OfflinePicture result_;
 };
 
@@ -181,6 +210,7 @@ std::pair<float, float> scalarRange(std::span<const ModelReader* const> models, 
     float low = std::numeric_limits<float>::infinity(), high = -low;
     std::mutex mutex;
     for (const ModelReader* model : models) {
+        if (!model->hasPatches()) continue;
         const size_t stride = model->info().schema.scalars.size();
         visitPatches(*model, rootCut(model->nodes()).nodes, [&](NodeIndex, const Mesh& mesh) {
             const std::lock_guard lock(mutex);

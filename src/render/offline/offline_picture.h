@@ -13,6 +13,7 @@
 
 #include "base/progress.h"
 #include "multires/cut.h"
+#include "multires/live_model.h"
 #include "render/picture.h"
 #include "render/shading.h"
 #include "store/model_reader.h"
@@ -35,12 +36,16 @@ struct OfflineSettings {
     /// of the graphics memory for pages, but not of what the driver needs for itself.
     size_t memory_bytes = size_t(1) << 30;
     int jobs = 1;  ///< threads that work, about: as many pages are decoded ahead
+    /// Of models whose pages are not patches, which are in memory one at a time. Where there is too
+    /// little of it, they are drawn coarser.
+    OpenLive open_live = nullptr;
 };
 
 struct OfflineStatistics {
     uint64_t patches = 0;    ///< drawn, after culling
     uint64_t triangles = 0;  ///< in them
     uint64_t pixels_covered = 0;
+    double tolerance_px = 0;    ///< what was asked for, or more, where memory was too small
     size_t resident_bytes = 0;  ///< largest amount held at a time, of what memory_bytes bounds
     size_t device_bytes = 0;    ///< of these, graphics memory for pages
     /// Reading and decoding are summed over threads, and go on while batches are drawn; the others

@@ -1,0 +1,148 @@
+#include "methods/pmesh/draw_chunks.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "geometry/bounds.h"
+#include "geometry/lattice.h"
+
+namespace pietra::pmesh {
+namespace {
+
+/// Triangles of a chunk. Fewer cost more vertices on borders, more mean more to make anew.
+constexpr size_t kMost = 3000, kFew = 200;
+constexpr uint32_t kNone = ~0u;
+
+/// Damage may take a vertex anywhere; renderers rely on the lattice.
+Vec3i onLattice(const Vertex& v, int shift) {
+    return glm::clamp(v.position(), 0, kLatticeMax >> shift) * (1 << shift);
+}
+
+float distance(const Vec3f& a, const Vec3i& b) {
+    return glm::length(a - Vec3f(b));
+}
+
+}  // namespace
+
+void DrawChunks::update(ActiveMesh& mesh) {
+    std::vector<uint8_t>& touched = mesh.chunk_touched;
+    if (touched.empty()) touched.assign(1, 1);
+    chunk_.resize(touched.size());
+    face_.resize(touched.size());
+    if (std::find(touched.begin(), touched.end(), 1) == touched.end()) return;
+    list(mesh);
+    bool given = false;
+    for (uint32_t c = 0; c < face_.size(); ++c)
+        if (touched[c] && !face_[c].empty() && face_[c].size() < kFew) given |= giveAway(mesh, c);
+    if (given) list(mesh);
+    for (uint32_t c = 0; c < face_.size(); ++c)  // which cutting adds to
+        while (face_[c].size() > kMost) cut(mesh, c);
+    std::vector<uint32_t> changed;
+    for (uint32_t c = 0; c < touched.size(); ++c)
+        if (touched[c]) changed.push_back(c);
+    ++version_;
+    parallelFor(changed.size(), [&](size_t i) { make(mesh, changed[i]); });
+    for (const uint32_t c : changed)
+        if (chunk_[c].version == 0) unused_.push_back(c);
+    std::fill(touched.begin(), touched.end(), 0);
+    for (const uint32_t c : changed) face_[c].clear();
+}
+
+/// The faces of what has changed.
+void DrawChunks::list(const ActiveMesh& mesh) {
+    for (auto& faces : face_) faces.clear();
+    for (uint32_t f = 0; f < mesh.faceCount(); ++f)
+        if (const uint32_t c = mesh.face[f].chunk(); mesh.chunk_touched[c]) face_[c].push_back(f);
+}
+
+/// To the first one that it borders on and that has room for it. False if there is none.
+bool DrawChunks::giveAway(ActiveMesh& mesh, uint32_t chunk) {
+    const size_t room = kMost - face_[chunk].size();
+    for (const uint32_t f : face_[chunk])
+        for (uint32_t k = 0; k < 3; ++k) {
+            const uint32_t twin = mesh.twinOf(4 * f + k);
+            if (twin == kNoCorner) continue;
+            const uint32_t other = mesh.face[twin >> 2].chunk();
+            if (other == chunk || chunk_[other].mesh.triangleCount() > room) continue;
+            for (const uint32_t g : face_[chunk]) mesh.face[g].left[3] = other;
+            mesh.chunk_touched[other] = 1;
+            return true;
+        }
+    return false;
+}
+
+/// Half of it goes to another one.
+void DrawChunks::cut(ActiveMesh& mesh, uint32_t chunk) {
+    std::vector<uint32_t>& faces = face_[chunk];
+    Box3i box;
+    for (const uint32_t f : faces) box.add(mesh.vertex[mesh.face[f].vertex[0]].position());
+    const Vec3i size = box.max - box.min;
+    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    const auto key = [&](uint32_t f) {
+        return mesh.vertex[mesh.face[f].vertex[0]].position()[axis];
+    };
+    const auto middle = faces.begin() + ptrdiff_t(faces.size() / 2);
+    std::nth_element(faces.begin(), middle, faces.end(), [&](uint32_t a, uint32_t b) {
+        return key(a) != key(b) ? key(a) < key(b) : a < b;
+    });
+    std::vector<uint32_t> rest(middle, faces.end());
+    faces.erase(middle, faces.end());
+    std::sort(faces.begin(), faces.end());
+    std::sort(rest.begin(), rest.end());
+    uint32_t other = uint32_t(chunk_.size());
+    if (unused_.empty()) {
+        chunk_.emplace_back();
+        face_.emplace_back();
+        mesh.chunk_touched.push_back(0);
+    } else {
+        other = unused_.back();
+        unused_.pop_back();
+    }
+    for (const uint32_t f : rest) mesh.face[f].left[3] = other;
+    face_[other] = std::move(rest);
+    mesh.chunk_touched[other] = 1;
+}
+
+void DrawChunks::make(const ActiveMesh& mesh, uint32_t index) {
+    thread_local std::vector<uint32_t> place, used;
+    if (place.size() < mesh.vertexCount()) place.resize(mesh.vertexCount(), kNone);
+    const int shift = mesh.source().lattice.shift;
+    LiveChunk& chunk = chunk_[index];
+    chunk.mesh.clear();
+    chunk.version = face_[index].empty() ? 0 : version_;
+    used.clear();
+    Box3i box;
+    for (const uint32_t f : face_[index]) {
+        Triangle t;
+        for (size_t k = 0; k < 3; ++k) {
+            const uint32_t v = mesh.face[f].vertex[k];
+            if (place[v] == kNone) {
+                place[v] = uint32_t(used.size());
+                used.push_back(v);
+                chunk.mesh.position.push_back(onLattice(mesh.vertex[v], shift));
+                chunk.mesh.normal.push_back(unpackNormal(mesh.vertex[v].normal));
+                box.add(chunk.mesh.position.back());
+            }
+            t[k] = place[v];
+        }
+        chunk.mesh.triangle.push_back(t);
+    }
+    const Vec3f centre = 0.5f * (Vec3f(box.min) + Vec3f(box.max));
+    uint32_t error = 0;
+    chunk.bounds = chunk.saturated = {centre, 0};
+    for (size_t i = 0; i < used.size(); ++i) {
+        const VertexCriteria& c = mesh.criteria[used[i]];
+        const float away = distance(centre, chunk.mesh.position[i]);
+        chunk.bounds.radius = std::max(chunk.bounds.radius, away);
+        const auto radius = float(decodeRadius(c.split_radius) << shift);
+        chunk.saturated.radius = std::max(chunk.saturated.radius, away + radius);
+        error = std::max<uint32_t>(error, c.split_error);
+        place[used[i]] = kNone;
+    }
+    chunk.error = float(double(decodeError(error)) * kErrorUnit * double(1 << shift));
+    constexpr uint32_t kCodesAnOctave = 8;
+    chunk.level = uint16_t((kMaxErrorCode - error) / kCodesAnOctave);
+}
+
+}  // namespace pietra::pmesh

@@ -1,0 +1,170 @@
+#include "methods/pmesh/live_mesh.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "methods/pmesh/adaption.h"
+#include "methods/pmesh/draw_chunks.h"
+#include "methods/pmesh/model.h"
+#include "methods/pmesh/node_codec.h"
+#include "methods/pmesh/resident_nodes.h"
+
+namespace pietra::pmesh {
+namespace {
+
+/// Of a pass while time is short: some milliseconds.
+constexpr size_t kPassOperations = 4096;
+
+struct NodePage : LivePage {
+    OperationNode node;
+};
+
+Criterion criterionFor(const View& view, const Lattice& lattice, double pixels) {
+    return pixels > 0 ? criterionOf(view, lattice, pixels) : criterionOf(-1.0, lattice);
+}
+
+/// With its roots.
+NodeForest openRoots(const ModelReader& reader) {
+    NodeForest forest = openForest(reader);
+    const auto damaged = [&](const std::string& what) {
+        throw InputError(reader.path(), "", "the model is damaged: " + what);
+    };
+    const HalfEdges edges = findHalfEdges(forest.base_triangle, forest.base_vertex.size());
+    for (size_t v = 0; v < forest.base_vertex.size(); ++v)
+        if (forest.base_operation[v] != kNoOperation &&
+            (edges.irregular[v] || edges.corner_of[v] == kNoCorner))
+            damaged(fmt::format("base vertex {} splits, but its triangles are no fan", v));
+    for (const Triangle& t : forest.base_triangle)
+        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) damaged("a base triangle has no area");
+    forest.node.resize(forest.row.size());
+    for (NodeIndex n = 0; n < forest.row.size(); ++n) {
+        if (forest.row[n].parent != kNoNode) continue;
+        if (const std::string fault = readNode(reader, forest, n, forest.node[n]); !fault.empty())
+            throw InputError::atByte(reader.path(), reader.page(n).offset, fault);
+    }
+    return forest;
+}
+
+class LiveMesh : public LiveModel {
+public:
+    explicit LiveMesh(const ModelReader& reader)
+        : rows_(rowsOf(reader.nodes(), reader.info().lattice.shift)),
+          nodes_(openRoots(reader), uint32_t(rows_.size())),
+          adaption_(nodes_.mesh(), &nodes_),
+          path_(reader.path()) {
+        chunks_.update(adaption_.mesh());
+    }
+
+    std::unique_ptr<LivePage> decode(uint32_t page, std::span<const std::byte> bytes,
+                                     std::string& fault) const override {
+        auto decoded = std::make_unique<NodePage>();
+        if (!decodeNode(bytes, page, rows_[page], decoded->node, fault)) return nullptr;
+        return decoded;
+    }
+    bool arrive(uint32_t page, std::unique_ptr<LivePage> decoded) override;
+    const LiveFrame& adapt(const LiveTask& task) override;
+    std::span<const LiveChunk> chunks() const override { return chunks_.chunks(); }
+    std::vector<uint32_t> requests(size_t most) const override { return nodes_.requests(most); }
+    std::vector<uint32_t> prefetch(const View& view, double pixels, size_t most) const override {
+        return nodes_.prefetch(criterionFor(view, lattice(), pixels), most);
+    }
+    size_t bytes() const override { return nodes_.loaded() * kNodeBytes + meshBytes(); }
+    size_t pageBytes() const override { return kNodeBytes; }
+    size_t release(size_t bytes) override;
+    std::span<const std::string> faults() const override { return faults_; }
+
+private:
+    const Lattice& lattice() const { return nodes_.mesh().lattice; }
+    size_t meshBytes() const { return adaption_.mesh().vertexCount() * kVertexBytes; }
+    double largestError(const View& view) const;
+
+    const std::vector<NodeRow> rows_;
+    ResidentNodes nodes_;
+    Adaption adaption_;
+    DrawChunks chunks_;
+    LiveFrame frame_;
+    std::string path_;
+    std::vector<std::string> faults_;
+};
+
+bool LiveMesh::arrive(uint32_t page, std::unique_ptr<LivePage> decoded) {
+    if (decoded) return nodes_.arrive(page, static_cast<const NodePage&>(*decoded).node);
+    nodes_.giveUp(page);
+    return true;
+}
+
+const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
+    const Criterion criterion = criterionFor(*task.view, lattice(), task.pixels);
+    FrameLimits limits;
+    limits.milliseconds = task.milliseconds;
+    limits.operations = kPassOperations;
+    const size_t node_bytes = nodes_.loaded() * kNodeBytes;
+    // A vertex more is two triangles more, at most.
+    const ProgressiveMesh& mesh = nodes_.mesh();
+    const uint64_t base = mesh.base_triangle.size();
+    const size_t in_memory =
+        (task.most_bytes - std::min(task.most_bytes, node_bytes)) / kVertexBytes;
+    const uint64_t drawable =
+        mesh.base_vertex.size() + (std::max(task.most_triangles, base) - base) / 2;
+    limits.vertices = std::min<uint64_t>(in_memory, drawable);
+    const PassCounts counts = adaption_.frame(criterion, limits);
+    nodes_.note(adaption_);
+    nodes_.setMost((task.most_bytes - std::min(task.most_bytes, meshBytes())) / kNodeBytes);
+    chunks_.update(adaption_.mesh());
+
+    frame_.operations = counts.operations();
+    frame_.busy = !counts.finished;
+    frame_.missing = nodes_.requests(~size_t(0)).size();
+    frame_.needed_bytes = nodes_.required() * kNodeBytes + meshBytes();
+    frame_.triangles = adaption_.mesh().faceCount();
+    const bool is_short = counts.finished && counts.short_of_room;
+    frame_.short_of_triangles = is_short && drawable <= in_memory;
+    frame_.short_of_memory = (is_short && in_memory < drawable) ||
+                             (counts.finished && frame_.needed_bytes > task.most_bytes);
+    if (frame_.short_of_memory) nodes_.evictOldest();
+    const bool is_done = counts.finished && !counts.short_of_room && adaption_.waiting().empty();
+    frame_.largest_px = is_done ? task.pixels : largestError(*task.view);
+    if (faults_.empty() && adaption_.refused() > 0)
+        faults_.push_back(path_ + ": the model is damaged: operations do not fit their places");
+    return frame_;
+}
+
+/// Of what could be refined in the picture.
+double LiveMesh::largestError(const View& view) const {
+    const ActiveMesh& mesh = adaption_.mesh();
+    const double step = double(1 << lattice().shift);
+    PerThread<double> largest(0.0);
+    parallelForSlices(mesh.vertexCount(), 4096, [&](size_t begin, size_t end) {
+        double& most = largest.local();
+        for (size_t v = begin; v < end; ++v) {
+            const VertexCriteria& c = mesh.criteria[v];
+            if (c.split_error == 0) continue;
+            const Sphere sphere{Vec3f(Vec3d(mesh.vertex[v].position()) * step),
+                                float(decodeRadius(c.split_radius) * step)};
+            const auto error = float(double(decodeError(c.split_error)) * kErrorUnit * step);
+            const double pixels = view.errorInPixels(error, sphere);
+            if (pixels > most && !view.outside(sphere)) most = pixels;
+        }
+    });
+    double most = 0;
+    for (const double m : largest) most = std::max(most, m);
+    return most;
+}
+
+size_t LiveMesh::release(size_t bytes) {
+    size_t released = 0;
+    while (released < bytes && nodes_.evictOldest()) released += kNodeBytes;
+    return released;
+}
+
+}  // namespace
+
+std::unique_ptr<LiveModel> openLive(const ModelReader& reader) {
+    return std::make_unique<LiveMesh>(reader);
+}
+
+}  // namespace pietra::pmesh

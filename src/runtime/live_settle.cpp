@@ -1,0 +1,93 @@
+#include "runtime/live_settle.h"
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "base/progress.h"
+#include "base/text.h"
+#include "runtime/patch_reader.h"
+
+namespace pietra {
+namespace {
+
+constexpr size_t kReadTogether = 256;
+constexpr double kRaise = 1.1;
+
+/// False if none of them could arrive.
+bool readPages(const ModelReader& reader, LiveModel& model, const std::vector<uint32_t>& pages) {
+    std::vector<std::unique_ptr<LivePage>> decoded(pages.size());
+    parallelFor(pages.size(), [&](size_t i) {
+        std::vector<std::byte> bytes;
+        std::string fault;
+        reader.readPage(pages[i], bytes);
+        decoded[i] = model.decode(pages[i], bytes, fault);
+        if (!decoded[i])
+            throw InputError::atByte(reader.path(), reader.page(pages[i]).offset, fault);
+    });
+    bool any = false;
+    for (size_t i = 0; i < pages.size(); ++i) any |= model.arrive(pages[i], std::move(decoded[i]));
+    return any;
+}
+
+}  // namespace
+
+std::unique_ptr<LiveModel> openLive(const ModelReader& reader, OpenLive open) {
+    if (open == nullptr) requirePatches(reader);
+    return open(reader);
+}
+
+double settle(const ModelReader& reader, LiveModel& model, const View& view, double pixels,
+              size_t most_bytes) {
+    if (model.bytes() > most_bytes)
+        throw MemoryError(fmt::format("the coarsest level needs {}", formatBytes(model.bytes())));
+    for (;;) {
+        if (Progress::cancelRequested()) throw Interrupted();
+        const LiveFrame& frame =
+            model.adapt({.view = &view, .pixels = pixels, .most_bytes = most_bytes});
+        const std::vector<uint32_t> pages = model.requests(kReadTogether);
+        const bool arrived = !pages.empty() && readPages(reader, model, pages);
+        if (arrived || frame.busy) continue;
+        if (!frame.short_of_memory) return pixels;
+        if (model.release(most_bytes) > 0) continue;
+        if (pixels == 0)
+            throw MemoryError(fmt::format("all of {} needs more than {}", reader.path(),
+                                          formatBytes(most_bytes)));
+        pixels *= kRaise;
+    }
+}
+
+void listChunks(std::span<const LiveChunk> chunks, uint32_t model, const View& view,
+                const Culling& culling, bool show_error, std::vector<DrawPatch>& list) {
+    list.clear();
+    for (uint32_t c = 0; c < chunks.size(); ++c) {
+        const LiveChunk& chunk = chunks[c];
+        if (chunk.version == 0 || (culling.frustum && view.outside(chunk.bounds))) continue;
+        DrawPatch patch;
+        patch.mesh = &chunk.mesh;
+        patch.page = {model, c};
+        patch.id = c + model * 0x9e3779b9u;
+        patch.value = show_error ? float(view.errorInPixels(chunk.error, chunk.saturated))
+                                 : float(chunk.level);
+        list.push_back(patch);
+    }
+}
+
+void refineEvenly(const ModelReader& reader, LiveModel& model, uint64_t triangles) {
+    const ModelInfo& info = reader.info();
+    const Vec3d low = info.lattice.toInput(info.bounds.min);
+    const Vec3d size = info.lattice.toInput(info.bounds.max) - low;
+    Camera camera;
+    camera.target = low + 0.5 * size;
+    // From so far that the error is all that counts.
+    camera.eye = camera.target + 4.0 * glm::length(size) * glm::normalize(Vec3d(0.5, -0.7, 0.6));
+    const View view(camera, {1024, 1024}, info.lattice);
+    for (double pixels = 64; pixels > 1e-3; pixels /= 2) {
+        settle(reader, model, view, pixels, ~size_t(0) / 2);
+        uint64_t count = 0;
+        for (const LiveChunk& chunk : model.chunks()) count += chunk.mesh.triangleCount();
+        if (count > triangles / 2) return;
+    }
+}
+
+}  // namespace pietra

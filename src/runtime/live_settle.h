@@ -1,0 +1,32 @@
+#pragma once
+// Adapted meshes without a clock: reads what they ask for until nothing is missing. For offline
+// pictures and coarse looks; the frame path has its loader. Throws MemoryError where the base mesh
+// does not fit, and InputError for pages that cannot be read.
+
+#include <vector>
+
+#include "multires/cut.h"
+#include "multires/draw_list.h"
+#include "multires/live_model.h"
+#include "store/model_reader.h"
+
+namespace pietra {
+
+/// Throws InputError where a model that is no patches cannot be opened so.
+std::unique_ptr<LiveModel> openLive(const ModelReader& reader, OpenLive open);
+
+/// Raises the tolerance as long as memory is too small; returns what it is then. Throws MemoryError
+/// if all is asked for (0 pixels) and does not fit. Reads on all threads.
+double settle(const ModelReader& reader, LiveModel& model, const View& view, double pixels,
+              size_t most_bytes);
+
+/// What is to be drawn of it; valid as long as the chunks are. `model`: its number in the scene.
+/// value: the error in pixels, or the level.
+void listChunks(std::span<const LiveChunk> chunks, uint32_t model, const View& view,
+                const Culling& culling, bool show_error, std::vector<DrawPatch>& list);
+
+/// Refines the same everywhere, until there are more than about so many triangles or no more
+/// are known. May read some pages.
+void refineEvenly(const ModelReader& reader, LiveModel& model, uint64_t triangles);
+
+}  // namespace pietra

@@ -1,0 +1,51 @@
+#pragma once
+// Chunks of adapted meshes in a renderer's own memory (multires/page_sink.h), where they are copied
+// anew when they have changed. Pages are those of models from a first number on, a chunk each.
+//
+// Sinks may have room, but not in one piece: then all chunks are taken out and copied again, side
+// by side. Whoever adapts meshes keeps them so small that this does: mostTriangles().
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "multires/live_model.h"
+#include "multires/page_sink.h"
+
+namespace pietra {
+
+class LiveUploads {
+public:
+    /// Of what is free, as long as it may lie in pieces.
+    static constexpr double kUsable = 0.7;
+
+    /// `sink` must outlive this; null: meshes are drawn where they are, and there is nothing to do.
+    LiveUploads(PageSink* sink, uint32_t first_model) : sink_(sink), first_model_(first_model) {}
+    ~LiveUploads();
+    LiveUploads(const LiveUploads&) = delete;
+    LiveUploads& operator=(const LiveUploads&) = delete;
+
+    /// What chunks there take now.
+    size_t bytes() const { return bytes_; }
+    /// Of model i, if others stay as they are.
+    uint64_t mostTriangles(uint32_t i) const;
+    /// Of model i, as chunks are now. False if not all of them are there: there is no room.
+    [[nodiscard]] bool update(uint32_t i, std::span<const LiveChunk> chunks);
+    bool holds(uint32_t i, uint32_t chunk) const { return models_[i].version[chunk] != 0; }
+
+private:
+    struct Model {
+        std::vector<uint64_t> version;  ///< of each chunk there; 0: none
+        size_t bytes = 0;
+    };
+    bool upload(uint32_t i, uint32_t chunk, const LiveChunk& from);
+    void release(uint32_t i, uint32_t chunk);
+    bool uploadChanged(uint32_t i, std::span<const LiveChunk> chunks);
+
+    PageSink* sink_;
+    const uint32_t first_model_;
+    std::vector<Model> models_;
+    size_t bytes_ = 0;
+};
+
+}  // namespace pietra
