@@ -57,13 +57,16 @@ void LivePool::want(uint32_t i, std::span<const uint32_t> pages) {
 }
 
 void LivePool::load() {
-    begun_ = loader_->forget();
+    auto begun = loader_->forget();
+    if (!begun) return;
+    begun_ = std::move(*begun);
     wanted_.clear();
     for (uint32_t i = 0; i < parts_.size(); ++i)
         want(i, parts_[i].model->requests(kMostWanted / parts_.size()));
     for (const int which : {0, 1})
         for (uint32_t i = 0; i < parts_.size(); ++i) want(i, parts_[i].ahead[which]);
-    loader_->want(wanted_);
+    std::vector<std::vector<Mesh>> none;
+    loader_->want(wanted_, none);
 }
 
 void LivePool::prefetch(size_t i, const View& view, double pixels, bool next_level) {

@@ -34,40 +34,50 @@ PageLoader::~PageLoader() {
     for (std::thread& thread : threads_) thread.join();
 }
 
-std::vector<PageKey> PageLoader::forget() {
-    const std::lock_guard lock(mutex_);
+std::optional<std::vector<PageKey>> PageLoader::forget() {
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (!lock) return {};
     queue_.clear();
     return begun_;
 }
 
-void PageLoader::want(std::span<const PageKey> wanted) {
-    if (wanted.empty()) return;
-    const std::lock_guard lock(mutex_);
-    queue_.assign(wanted.begin(), wanted.end());
+void PageLoader::want(std::span<const PageKey> wanted, std::vector<std::vector<Mesh>>& dropped) {
+    if (wanted.empty() && dropped.empty()) return;
+    {
+        const std::unique_lock lock(mutex_, std::try_to_lock);
+        if (!lock) return;
+        queue_.assign(wanted.begin(), wanted.end());
+        std::move(dropped.begin(), dropped.end(), std::back_inserter(dropped_));
+        dropped.clear();
+    }
     wake_.notify_all();
 }
 
 void PageLoader::take(std::vector<LoadedPage>& pages) {
-    const std::lock_guard lock(mutex_);
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (!lock) return;
     for (const LoadedPage& page : ready_)
         begun_.erase(std::find(begun_.begin(), begun_.end(), page.key));
     std::move(ready_.begin(), ready_.end(), std::back_inserter(pages));
     ready_.clear();
 }
 
-uint64_t PageLoader::bytesRead() const {
-    const std::lock_guard lock(mutex_);
-    return bytes_read_;
-}
-
-/// False if there is nothing more to do, ever.
-bool PageLoader::next(PageKey& key) {
+/// The next page to load; or none, after having freed meshes. False if there is nothing more to do,
+/// ever.
+bool PageLoader::next(std::optional<PageKey>& key) {
+    std::vector<std::vector<Mesh>> dropped;
     std::unique_lock lock(mutex_);
-    wake_.wait(lock, [&] { return stop_ || !queue_.empty(); });
+    wake_.wait(lock, [&] { return stop_ || !queue_.empty() || !dropped_.empty(); });
     if (stop_) return false;
+    key.reset();
+    dropped.swap(dropped_);
+    if (!dropped.empty()) {
+        lock.unlock();
+        return true;
+    }
     key = queue_.front();
     queue_.pop_front();
-    begun_.push_back(key);
+    begun_.push_back(*key);
     return true;
 }
 
@@ -84,11 +94,12 @@ void PageLoader::load(LoadedPage& page, std::vector<std::byte>& bytes) const {
 void PageLoader::work() {
     std::vector<std::byte> bytes;
     stayInTheBackground();
-    for (PageKey key; next(key);) {
-        LoadedPage loaded{key, {}, {}, {}};
+    for (std::optional<PageKey> key; next(key);) {
+        if (!key) continue;
+        LoadedPage loaded{*key, {}, {}, {}};
         load(loaded, bytes);
-        const std::lock_guard lock(mutex_);
         bytes_read_ += bytes.size();
+        const std::lock_guard lock(mutex_);
         ready_.push_back(std::move(loaded));
     }
 }

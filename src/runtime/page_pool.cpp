@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "base/error.h"
 #include "base/text.h"
 #include "runtime/patch_reader.h"
@@ -153,21 +155,25 @@ void PagePool::want(PageKey key, Need need) {
 
 void PagePool::load() {
     std::vector<PageKey> to_load;
-    const std::vector<PageKey> begun = loader_->forget();
-    forgetUnwanted();
-    reserve(begun);
     missing_ = 0;
+    const auto begun = loader_->forget();
+    if (!begun) {
+        for (const Wanted& wanted : wanted_) missing_ += wanted.need != Need::kLater;
+        return;
+    }
+    forgetUnwanted();
+    reserve(*begun);
     for (const PageKey& key : arriving_) keepWhatWaitsFor(key);
     blocked_ = scattered_bytes_ > 0 && !makeRoomToDraw(scattered_bytes_, Need::kDraw);
     for (const Wanted& wanted : wanted_) {
         missing_ += wanted.need != Need::kLater;
         if (wanted.need == Need::kDraw) keepWhatWaitsFor(wanted.key);
         if (modelOf(wanted.key).arriving[wanted.key.page] != 0 ||
-            std::find(begun.begin(), begun.end(), wanted.key) != begun.end())
+            std::find(begun->begin(), begun->end(), wanted.key) != begun->end())
             continue;
         if (blocked_ || !provide(wanted, to_load)) break;
     }
-    loader_->want(to_load);
+    loader_->want(to_load, dropped_);
 }
 
 /// What could not arrive while it was wanted.
@@ -299,7 +305,7 @@ bool PagePool::leave(const PageKey& key) {
 bool PagePool::dropCopy(const PageKey& key) {
     SceneModel& model = modelOf(key);
     if (model.arriving[key.page] != 0) return false;
-    model.copies[key.page] = {};
+    dropped_.push_back(std::exchange(model.copies[key.page], {}));
     ram_.used -= model.copy_bytes[key.page];
     return true;
 }

@@ -92,6 +92,7 @@ private:
     std::vector<Wanted> wanted_;
     std::vector<LoadedPage> loaded_;
     std::vector<PageKey> arriving_;
+    std::vector<std::vector<Mesh>> dropped_;  // evicted, to be freed by the loader
     size_t scattered_bytes_ = 0;  ///< that the sink has free, about, but not in one piece
     bool blocked_ = false;
     size_t missing_ = 0;

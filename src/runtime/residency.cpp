@@ -89,7 +89,6 @@ void Residency::arrive(PageIndex page) {
 void Residency::leave(PageIndex page) {
     CHECK(resident(page) && mayLeave(page));
     resident_[page] = 0;
-    ++departures_;
     for (const PageIndex above : above_.of(page)) --resident_children_[above];
     for (const PageIndex below : below_.of(page)) ++missing_parents_[below];
     for (const uint32_t group : groups_above_page_.of(page)) shut(group);

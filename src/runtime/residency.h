@@ -47,8 +47,6 @@ public:
     void arrive(PageIndex page);
     /// The page must be resident, and mayLeave().
     void leave(PageIndex page);
-    /// How many pages have left so far.
-    uint64_t departures() const { return departures_; }
 
     /// All nodes of the group may be replaced by their children. Never true of leaves.
     bool open(uint32_t group) const { return shut_by_[group] == 0; }
@@ -79,7 +77,6 @@ private:
     std::vector<uint32_t> missing_parents_, resident_children_;  // a page
     std::vector<uint32_t> shut_by_;  // a group: missing pages of children and shut parent groups
     std::vector<uint32_t> stack_;
-    uint64_t departures_ = 0;
 };
 
 }  // namespace pietra

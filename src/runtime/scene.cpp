@@ -292,9 +292,10 @@ std::vector<PageKey> Scene::Impl::pagesFor(const Camera& camera, const FrameRequ
 bool Scene::Impl::mayBeInside(uint32_t m, const View& view) {
     SceneModel& model = *models_[m];
     if (!holds(model.closed_parts, view.eye())) return false;
-    // What is drawn is no coarser than what decided the matter, as long as no page has left.
-    const uint64_t departures = model.residency.departures();
-    if (model.side && departures == model.side_departures && model.side->decides(view.eye()))
+    // What is drawn is no coarser than what decided the matter, as long as that is all there.
+    if (model.side && model.side->decides(view.eye()) &&
+        std::all_of(model.side_pages.begin(), model.side_pages.end(),
+                    [&](PageIndex page) { return model.residency.resident(page); }))
         return model.side->mayBeInside();
     model.side.reset();
     cut_for_eye_.clear();
@@ -325,7 +326,7 @@ bool Scene::Impl::mayBeInside(uint32_t m, const View& view) {
     EyeSide side(view.eye());
     for (const EyeSide& part : parts) side.add(part);
     model.side = side;
-    model.side_departures = departures;
+    model.side_pages = pages_for_eye_;
     return side.mayBeInside();
 }
 

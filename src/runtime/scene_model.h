@@ -37,8 +37,8 @@ struct SceneModel {
     Residency residency;  ///< of what may be drawn
     ForestRefiner refiner;
     Box3d closed_parts;
-    std::optional<EyeSide> side;  ///< of the last eye that was not decided by one before
-    uint64_t side_departures = 0;
+    std::optional<EyeSide> side;        ///< of the last eye that was not decided by one before
+    std::vector<PageIndex> side_pages;  ///< of the cut that decided it
     // Of each page:
     std::vector<size_t> copy_bytes;         ///< of its meshes in RAM
     std::vector<size_t> drawn_bytes;        ///< where it is drawn from; about, until it was there
