@@ -74,7 +74,7 @@ private:
         NodeIndex node;
         bool covered;  // a node above it is drawn, as its group is not open
     };
-    std::vector<Visited> stack_;
+    std::vector<Visited> level_, next_level_;
     std::vector<Missing> missing_;
     std::vector<uint32_t> group_used_, page_used_;            // by which select() last
     std::vector<uint32_t> group_requested_, page_requested_;  // in which round last
@@ -83,27 +83,33 @@ private:
 
 /// Top-down over what may be visible: draw(node, pixels of error), refined(group) for those that
 /// are refined. Those that should be go to `missing_`, and likewise what should be below them, if
-/// all levels that are missing are to be asked for at once.
+/// all levels that are missing are to be asked for at once. Level by level, so that nodes are on
+/// their way to the cache long before they are looked at.
 template <class Draw, class Refined>
 void ForestRefiner::visit(const View& view, double pixels, const Culling& culling, Missed missed,
                           const Draw& draw, const Refined& refined) {
     missing_.clear();
-    stack_.clear();
-    for (const NodeIndex root : forest_.roots()) stack_.push_back({root, false});
-    while (!stack_.empty()) {
-        const auto [i, covered] = stack_.back();
-        stack_.pop_back();
-        const Node& node = forest_.node(i);
-        if (branchInvisible(node, view, pixels, culling)) continue;
-        const double error = view.errorInPixels(node.error, node.saturated);
-        const bool refine = !node.isLeaf() && !(error <= pixels);
-        const bool open = refine && residency_.open(forest_.groupOf(i));
-        if (open) refined(forest_.groupOf(i));
-        if (refine && !open) missing_.push_back({forest_.groupOf(i), float(error)});
-        if (!open && !covered && !patchInvisible(node, view, pixels, culling)) draw(i, error);
-        if (!refine || (!open && missed == Missed::kFirst)) continue;
-        for (const NodeIndex child : node.child)
-            if (child != kNoNode) stack_.push_back({child, !open});
+    next_level_.clear();
+    for (const NodeIndex root : forest_.roots()) next_level_.push_back({root, false});
+    while (!next_level_.empty()) {
+        level_.swap(next_level_);
+        next_level_.clear();
+        for (const auto [i, covered] : level_) {
+            const Node& node = forest_.node(i);
+            if (branchInvisible(node, view, pixels, culling)) continue;
+            const double error = view.errorInPixels(node.error, node.saturated);
+            const bool refine = !node.isLeaf() && !(error <= pixels);
+            const bool open = refine && residency_.open(forest_.groupOf(i));
+            if (open) refined(forest_.groupOf(i));
+            if (refine && !open) missing_.push_back({forest_.groupOf(i), float(error)});
+            if (!open && !covered && !patchInvisible(node, view, pixels, culling)) draw(i, error);
+            if (!refine || (!open && missed == Missed::kFirst)) continue;
+            for (const NodeIndex child : node.child)
+                if (child != kNoNode) {
+                    next_level_.push_back({child, !open});
+                    forest_.prefetch(child);
+                }
+        }
     }
 }
 
