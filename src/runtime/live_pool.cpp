@@ -19,8 +19,16 @@ LivePool::LivePool(const std::vector<const ModelReader*>& readers, OpenLive open
         std::make_unique<PageLoader>(std::move(sources), readers.empty() ? 0 : loader_threads);
 }
 
+size_t LivePool::pageBytes(std::span<const PageKey> pages) const {
+    size_t bytes = 0;
+    for (const PageKey& key : pages) bytes += parts_[key.model].model->pageBytes();
+    return bytes;
+}
+
 void LivePool::publish() {
     loader_->take(ready_);
+    for (const LoadedPage& page : ready_)
+        for (auto* under_way : {&begun_, &wanted_}) std::erase(*under_way, page.key);
     const size_t count = std::min(ready_.size(), kMostArrivals);
     for (size_t i = 0; i < count; ++i) {
         LoadedPage& page = ready_[i];
@@ -38,35 +46,63 @@ void LivePool::publish() {
 const LiveFrame& LivePool::adapt(size_t i, LiveTask task, size_t free_bytes) {
     Part& part = parts_[i];
     task.most_bytes = part.model->bytes() + free_bytes;
+    forAllUnderWay([&](const PageKey& key) {
+        if (key.model == i) task.arriving_bytes += part.model->pageBytes();
+    });
     part.frame = part.model->adapt(task);
     for (const auto faults = part.model->faults(); part.faults_told < faults.size();)
         faults_.push_back(faults[part.faults_told++]);
     return part.frame;
 }
 
+template <class Body>
+void LivePool::forAllUnderWay(const Body& body) const {
+    for (const PageKey& key : begun_) body(key);
+    for (const PageKey& key : wanted_) body(key);
+    for (const LoadedPage& page : ready_) body(page.key);
+}
+
 bool LivePool::isUnderWay(const PageKey& key) const {
-    return std::find(begun_.begin(), begun_.end(), key) != begun_.end() ||
-           std::find(wanted_.begin(), wanted_.end(), key) != wanted_.end() ||
-           std::any_of(ready_.begin(), ready_.end(),
-                       [&](const LoadedPage& page) { return page.key == key; });
+    bool found = false;
+    forAllUnderWay([&](const PageKey& other) { found |= other == key; });
+    return found;
 }
 
-void LivePool::want(uint32_t i, std::span<const uint32_t> pages) {
-    for (const uint32_t page : pages)
-        if (wanted_.size() < kMostWanted && !isUnderWay({i, page})) wanted_.push_back({i, page});
+/// For what is needed now, others leave.
+void LivePool::want(uint32_t i, std::span<const uint32_t> pages, bool now) {
+    LiveModel& model = *parts_[i].model;
+    for (const uint32_t page : pages) {
+        if (wanted_.size() == kMostWanted || isUnderWay({i, page})) continue;
+        if (now && free_bytes_ < model.pageBytes()) free_bytes_ += model.release(model.pageBytes());
+        if (free_bytes_ < model.pageBytes()) {
+            no_room_ |= now;
+            return;
+        }
+        free_bytes_ -= model.pageBytes();
+        wanted_.push_back({i, page});
+    }
 }
 
-void LivePool::load() {
+void LivePool::load(size_t free_bytes) {
     auto begun = loader_->forget();
     if (!begun) return;
-    begun_ = std::move(*begun);
+    // What was wanted and not begun gives its room back.
+    free_bytes_ = free_bytes + pageBytes(begun_) + pageBytes(wanted_);
     wanted_.clear();
+    begun_ = std::move(*begun);
+    free_bytes_ -= std::min(free_bytes_, pageBytes(begun_));
+    no_room_ = false;
     for (uint32_t i = 0; i < parts_.size(); ++i)
-        want(i, parts_[i].model->requests(kMostWanted / parts_.size()));
+        want(i, parts_[i].model->requests(kMostWanted / parts_.size()), true);
     for (const int which : {0, 1})
+<<<<<<< HEAD
         for (uint32_t i = 0; i < parts_.size(); ++i) want(i, parts_[i].ahead[which]);
     std::vector<std::vector<Mesh>> none;
     loader_->want(wanted_, none);
+=======
+        for (uint32_t i = 0; i < parts_.size(); ++i) want(i, parts_[i].ahead[which], false);
+    loader_->want(wanted_);
+>>>>>>> 60df7d7 (tests: Scenes of adapted meshes: valid in any budget, damage, mixed, own memory)
 }
 
 void LivePool::prefetch(size_t i, const View& view, double pixels, bool next_level) {
@@ -81,9 +117,7 @@ void LivePool::forgetPrefetch() {
 size_t LivePool::bytes() const {
     size_t bytes = 0;
     for (const Part& part : parts_) bytes += part.model->bytes();
-    const auto add = [&](const PageKey& key) { bytes += parts_[key.model].model->pageBytes(); };
-    for (const PageKey& key : begun_) add(key);
-    for (const LoadedPage& page : ready_) add(page.key);
+    forAllUnderWay([&](const PageKey& key) { bytes += parts_[key.model].model->pageBytes(); });
     return bytes;
 }
 
@@ -100,8 +134,11 @@ size_t LivePool::missing() const {
 }
 
 bool LivePool::shortOfMemory() const {
-    return std::any_of(parts_.begin(), parts_.end(),
-                       [](const Part& part) { return part.frame.short_of_memory; });
+    const auto any = [&](const auto& says) {
+        return std::any_of(parts_.begin(), parts_.end(), says);
+    };
+    return (no_room_ && !any([](const Part& part) { return part.frame.busy; })) ||
+           any([](const Part& part) { return part.frame.short_of_memory; });
 }
 
 bool LivePool::shortOfTriangles() const {

@@ -25,8 +25,9 @@ public:
     void publish();
     /// task.most_bytes is set: by `free_bytes` more than the model has.
     const LiveFrame& adapt(size_t i, LiveTask task, size_t free_bytes);
-    /// Pages to load in any case, and pages for views to come, if there is time.
-    void load();
+    /// Sends for pages that are needed, as far as they fit what is free, and for such that views to
+    /// come will need.
+    void load(size_t free_bytes);
     /// These, from now on: of model i, instead of those before.
     void prefetch(size_t i, const View& view, double pixels, bool next_level);
     void forgetPrefetch();
@@ -56,11 +57,17 @@ private:
         std::vector<uint32_t> ahead[2];  ///< pages to be prefetched
     };
     bool isUnderWay(const PageKey& key) const;
-    void want(uint32_t i, std::span<const uint32_t> pages);
+    size_t pageBytes(std::span<const PageKey> pages) const;
+    void want(uint32_t i, std::span<const uint32_t> pages, bool now);
+    /// body(key) for all that is on its way.
+    template <class Body>
+    void forAllUnderWay(const Body& body) const;
 
     std::vector<Part> parts_;
     std::vector<LoadedPage> ready_;
     std::vector<PageKey> begun_, wanted_;
+    size_t free_bytes_ = 0;  // while wanting
+    bool no_room_ = false;   // for something needed
     std::vector<std::string> faults_;
     std::unique_ptr<PageLoader> loader_;  // last: its threads end first
 };

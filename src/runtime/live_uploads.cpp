@@ -6,7 +6,7 @@ namespace pietra {
 namespace {
 
 /// What a triangle of a chunk takes, about: half a vertex, some of them twice, and its indices.
-constexpr double kTriangleBytes = 15;
+constexpr double kTriangleBytes = 16;
 
 }  // namespace
 

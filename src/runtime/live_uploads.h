@@ -17,7 +17,7 @@ namespace pietra {
 class LiveUploads {
 public:
     /// Of what is free, as long as it may lie in pieces.
-    static constexpr double kUsable = 0.7;
+    static constexpr double kUsable = 0.6;
 
     /// `sink` must outlive this; null: meshes are drawn where they are, and there is nothing to do.
     LiveUploads(PageSink* sink, uint32_t first_model) : sink_(sink), first_model_(first_model) {}
@@ -29,7 +29,8 @@ public:
     size_t bytes() const { return bytes_; }
     /// Of model i, if others stay as they are.
     uint64_t mostTriangles(uint32_t i) const;
-    /// Of model i, as chunks are now. False if not all of them are there: there is no room.
+    /// Of model i, as chunks are now. False if not all of them are there: there is no room, and the
+    /// mesh must get coarser before it is drawn.
     [[nodiscard]] bool update(uint32_t i, std::span<const LiveChunk> chunks);
     bool holds(uint32_t i, uint32_t chunk) const { return models_[i].version[chunk] != 0; }
 

@@ -54,6 +54,7 @@ public:
     size_t missing() const { return missing_; }
     /// Whether so many bytes may stay in RAM, beside what passes through.
     bool mayStay(size_t bytes) const { return sink_ == nullptr || bytes <= ram_.budget / 2; }
+    size_t freeRam() const { return ram_.free(); }
     size_t ramBudget() const { return ram_.budget; }
     size_t deviceBudget() const { return device_.budget; }  ///< 0: there is no sink
     /// In RAM, what is on its way included.

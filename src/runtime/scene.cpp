@@ -28,6 +28,8 @@ constexpr double kLookahead = 0.5, kNextLevel = 0.5;
 constexpr uint32_t kPrefetchFrames = 4;
 /// What patches let go of at a time for adapted meshes, and the other way round.
 constexpr size_t kReleasedBytes = size_t(2) << 20;
+/// A tolerance, in pixels, at which everything is as coarse as can be.
+constexpr double kCoarsest = 1e9;
 
 std::vector<const ModelReader*> thoseThat(const std::vector<const ModelReader*>& all,
                                           bool have_patches) {
@@ -142,7 +144,7 @@ const Frame& Scene::Impl::update(const FrameRequest& request) {
     request.prefetch ? prefetch(request) : live_.forgetPrefetch();
     pages_.setElsewhere(live_.bytes());
     pages_.load();
-    live_.load();
+    live_.load(pages_.freeRam());
     const size_t missing = pages_.missing() + live_.missing();
     frame_.raised = tolerance_.factor() > 1;
     frame_.converged = missing == 0 && !frame_.raised;
@@ -216,17 +218,22 @@ void Scene::Impl::select(uint32_t m, const FrameRequest& request, ModelFrame& ou
 
 void Scene::Impl::adapt(uint32_t i, const FrameRequest& request, ModelFrame& out) {
     const Stopwatch watch;
-    const size_t taken = pages_.ramBytes() + live_.bytes();
-    const LiveFrame& live = live_.adapt(i,
-                                        {.view = &out.view,
-                                         .pixels = request.pixels * tolerance_.factor(),
-                                         .milliseconds = adapt_ms_ / double(live_.size()),
-                                         .most_triangles = uploads_.mostTriangles(i)},
-                                        pages_.ramBudget() - std::min(pages_.ramBudget(), taken));
+    pages_.setElsewhere(live_.bytes());
+    LiveTask task{.view = &out.view,
+                  .pixels = request.pixels * tolerance_.factor(),
+                  .milliseconds = adapt_ms_ / double(live_.size()),
+                  .most_triangles = uploads_.mostTriangles(i)};
+    const LiveFrame& live = live_.adapt(i, task, pages_.freeRam());
+    if (i == 0) uploads_fit_ = true;
+    // No frame has a hole, if it takes time.
+    while (!uploads_.update(i, live_.model(i).chunks()) && task.pixels < kCoarsest) {
+        uploads_fit_ = false;
+        task.pixels = 4 * std::max(task.pixels, 1.0);
+        task.milliseconds = std::numeric_limits<double>::infinity();
+        (void)live_.adapt(i, task, pages_.freeRam());
+    }
     frame_.adapt_ms += watch.ms();
     frame_.tolerance_px = std::max(frame_.tolerance_px, live.largest_px);
-    if (i == 0) uploads_fit_ = true;
-    uploads_fit_ &= uploads_.update(i, live_.model(i).chunks());
     const auto m = uint32_t(models_.size()) + i;
     listChunks(live_.model(i).chunks(), m, out.view, request.culling, request.show_error,
                out.patches);

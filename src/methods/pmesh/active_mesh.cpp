@@ -152,13 +152,13 @@ bool ActiveMesh::orient(Star& star) const {
 }
 
 bool ActiveMesh::mayBeNext(Star& star, uint32_t v) const {
-    constexpr int32_t kFar = 1 << 22;  // from all lattice points; sums do not overflow
+    const int32_t far = (1 << 22) >> source_->lattice.shift;  // no sum overflows
     const Operation& o = source_->at(record[v].next);
     if (star.count == 0 || (!o.isDummy() && !orient(star))) return false;
     const uint32_t n = star.neighbours(), l = o.rankLeft(), r = o.rankRight();
     for (const int end : {0, 1}) {
         const Vec3i p = glm::abs(vertex[v].position() + o.offset(end));
-        if (std::max({p.x, p.y, p.z}) > kFar) return false;
+        if (std::max({p.x, p.y, p.z}) > far) return false;
     }
     if (o.level != pulse[v].next_level) return false;
     for (const uint32_t w : star.ring())

@@ -14,9 +14,11 @@ namespace {
 constexpr size_t kMost = 3000, kFew = 200;
 constexpr uint32_t kNone = ~0u;
 
-/// Damage may take a vertex anywhere; renderers rely on the lattice.
-Vec3i onLattice(const Vertex& v, int shift) {
-    return glm::clamp(v.position(), 0, kLatticeMax >> shift) * (1 << shift);
+/// Damage may take a vertex anywhere; renderers rely on 21 bits. Rounding alone takes none so far
+/// off the lattice.
+Vec3i drawnPosition(const Vertex& v, int shift) {
+    constexpr int32_t kOff = 1 << (kMaxLatticeShift - 1);
+    return glm::clamp(v.position() * (1 << shift), -kOff, kLatticeMax + kOff - 1);
 }
 
 float distance(const Vec3f& a, const Vec3i& b) {
@@ -120,7 +122,7 @@ void DrawChunks::make(const ActiveMesh& mesh, uint32_t index) {
             if (place[v] == kNone) {
                 place[v] = uint32_t(used.size());
                 used.push_back(v);
-                chunk.mesh.position.push_back(onLattice(mesh.vertex[v], shift));
+                chunk.mesh.position.push_back(drawnPosition(mesh.vertex[v], shift));
                 chunk.mesh.normal.push_back(unpackNormal(mesh.vertex[v].normal));
                 box.add(chunk.mesh.position.back());
             }

@@ -38,6 +38,9 @@ NodeForest openRoots(const ModelReader& reader) {
         if (forest.base_operation[v] != kNoOperation &&
             (edges.irregular[v] || edges.corner_of[v] == kNoCorner))
             damaged(fmt::format("base vertex {} splits, but its triangles are no fan", v));
+    for (const Vertex& v : forest.base_vertex)
+        if (std::max({v.x, v.y, v.z}) > kLatticeMax >> forest.lattice.shift)
+            damaged("a base vertex is off the lattice");
     for (const Triangle& t : forest.base_triangle)
         if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) damaged("a base triangle has no area");
     forest.node.resize(forest.row.size());
@@ -113,7 +116,9 @@ const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
     limits.vertices = std::min<uint64_t>(in_memory, drawable);
     const PassCounts counts = adaption_.frame(criterion, limits);
     nodes_.note(adaption_);
-    nodes_.setMost((task.most_bytes - std::min(task.most_bytes, meshBytes())) / kNodeBytes);
+    nodes_.setMost(
+        (task.most_bytes + task.arriving_bytes - std::min(task.most_bytes, meshBytes())) /
+        kNodeBytes);
     chunks_.update(adaption_.mesh());
 
     frame_.operations = counts.operations();

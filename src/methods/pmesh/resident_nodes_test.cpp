@@ -85,6 +85,7 @@ TEST_F(Nodes, ArriveInAnyOrderAndLeaveAndTheMeshIsTheSame) {
         expectSame(walker.adaption.mesh(), in_core_.mesh());
     }
     EXPECT_GT(evicted, 0u);
+    EXPECT_EQ(walker.adaption.refused(), 0u);
 }
 
 /// All near a point of the sphere, and nothing beyond.
@@ -177,6 +178,52 @@ TEST_F(Nodes, WithAppliedOperationsStay) {
     walker.nodes.note(walker.adaption);
     for (NodeIndex n = NodeIndex(forest_.node.size()); n-- > 0;)
         EXPECT_EQ(walker.nodes.evict(n), forest_.row[n].parent != kNoNode);
+}
+
+/// Whatever is wrong with nodes that have no fault by themselves, what they do to the mesh is left
+/// undone: it stays a mesh, and everything ends.
+TEST_F(Nodes, ThatDoNotFitLeaveAMesh) {
+    uint32_t refused = 0, given_up = 0;
+    for (int round = 0; round < 12; ++round) {
+        NodeForest damaged = forest_;
+        for (NodeIndex n = 1; n < damaged.node.size(); ++n) {
+            if (random_() % 2) continue;
+            OperationNode& node = damaged.node[n];
+            const OperationNode whole = node;
+            NodeOperation& o = node.operation[random_() % node.operation.size()];
+            switch (random_() % 5) {
+                case 0:
+                    o.ranks = uint8_t(random_());
+                    break;
+                case 1:
+                    o.structure = StructureWord::of(o.structure.child(0), o.structure.child(1),
+                                                    uint32_t(random_() % 300));
+                    break;
+                case 2:
+                    o.shift = uint8_t(random_() % 21);
+                    o.delta[0][0] = int8_t(random_());
+                    break;
+                case 3:
+                    for (auto& levels : node.reference_level)
+                        for (uint16_t& level : levels) level = uint16_t(level + random_() % 9);
+                    break;
+                default:
+                    node = forest_.node[random_() % forest_.node.size()];
+            }
+            if (!faultOf(n, damaged.row[n], node).empty()) node = whole;
+        }
+        OutOfCore walker(damaged, kPlenty);
+        const Topology topology = topologyOf(walker.adaption.mesh());
+        for (int i = 0; i < 6; ++i) {
+            const Criterion view = i % 3 == 2 ? everything() : randomView(random_, built_.input);
+            EXPECT_TRUE(walker.settle(view));
+            EXPECT_EQ(topologyOf(walker.adaption.mesh()), topology);
+        }
+        refused += walker.adaption.refused();
+        for (NodeIndex n = 0; n < damaged.node.size(); ++n) given_up += walker.nodes.isGivenUp(n);
+    }
+    EXPECT_GT(refused, 30u);
+    EXPECT_GT(given_up, 0u);
 }
 
 }  // namespace
