@@ -74,15 +74,16 @@ public:
                                              std::string& fault) const = 0;
     /// A page that was asked for; null: it cannot be had, and will not be asked for again. False,
     /// and nothing done, if there is no room for it, or it is not to be had before another one.
-    [[nodiscard]] virtual bool arrive(uint32_t page, std::unique_ptr<LivePage> decoded) = 0;
+    [[nodiscard]] virtual bool arrive(uint32_t page, const LivePage* decoded) = 0;
 
     virtual const LiveFrame& adapt(const LiveTask& task) = 0;
     /// Valid until the next adapt().
     virtual std::span<const LiveChunk> chunks() const = 0;
     /// Pages that are needed, at most so many, the most urgent first.
     virtual std::vector<uint32_t> requests(size_t most) const = 0;
-    /// At most so many that another view would need first.
-    virtual std::vector<uint32_t> prefetch(const View& view, double pixels, size_t most) const = 0;
+    /// At most so many that another view may need, those first that others depend on; none that
+    /// would drive out what was used lately.
+    virtual std::vector<uint32_t> prefetch(const View& view, double pixels, size_t most) = 0;
 
     /// What it holds, and what a page adds to that, at most.
     virtual size_t bytes() const = 0;

@@ -30,17 +30,26 @@ void LivePool::publish() {
     for (const LoadedPage& page : ready_)
         for (auto* under_way : {&begun_, &wanted_}) std::erase(*under_way, page.key);
     const size_t count = std::min(ready_.size(), kMostArrivals);
-    for (size_t i = 0; i < count; ++i) {
-        LoadedPage& page = ready_[i];
-        Part& part = parts_[page.key.model];
+    const std::span<LoadedPage> arriving(ready_.data(), count);
+    // Twice: of two, the one that must be there first may have come after the other.
+    std::vector<uint8_t> is_there(count, 0);
+    for (int round = 0; round < 2; ++round)
+        for (size_t i = 0; i < count; ++i)
+            if (!is_there[i]) is_there[i] = arrive(arriving[i]);
+    // What has no room now is asked for again, if it is still needed.
+    ready_.erase(ready_.begin(), ready_.begin() + ptrdiff_t(count));
+}
+
+bool LivePool::arrive(LoadedPage& page) {
+    Part& part = parts_[page.key.model];
+    for (auto& pages : part.ahead) std::erase(pages, page.key.page);
+    if (part.model->arrive(page.key.page, page.live.get())) {
         if (!page.live)
             faults_.push_back(fmt::format("{}: byte {}: {}", part.reader->path(),
                                           part.reader->page(page.key.page).offset, page.fault));
-        for (auto& pages : part.ahead) std::erase(pages, page.key.page);
-        // What has no room now is asked for again, if it is still needed.
-        (void)part.model->arrive(page.key.page, std::move(page.live));
+        return true;
     }
-    ready_.erase(ready_.begin(), ready_.begin() + ptrdiff_t(count));
+    return false;
 }
 
 const LiveFrame& LivePool::adapt(size_t i, LiveTask task, size_t free_bytes) {
@@ -106,7 +115,7 @@ void LivePool::load(size_t free_bytes) {
 }
 
 void LivePool::prefetch(size_t i, const View& view, double pixels, bool next_level) {
-    parts_[i].ahead[next_level] = parts_[i].model->prefetch(view, pixels, kMostWanted);
+    parts_[i].ahead[next_level] = parts_[i].model->prefetch(view, pixels, kMostAhead);
 }
 
 void LivePool::forgetPrefetch() {

@@ -47,7 +47,7 @@ public:
     const std::vector<std::string>& faults() const { return faults_; }
 
 private:
-    static constexpr size_t kMostArrivals = 32, kMostWanted = 64;
+    static constexpr size_t kMostArrivals = 32, kMostWanted = 64, kMostAhead = 512;
 
     struct Part {
         const ModelReader* reader;
@@ -56,6 +56,7 @@ private:
         size_t faults_told = 0;
         std::vector<uint32_t> ahead[2];  ///< pages to be prefetched
     };
+    bool arrive(LoadedPage& page);
     bool isUnderWay(const PageKey& key) const;
     size_t pageBytes(std::span<const PageKey> pages) const;
     void want(uint32_t i, std::span<const uint32_t> pages, bool now);

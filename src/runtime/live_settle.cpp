@@ -26,7 +26,7 @@ bool readPages(const ModelReader& reader, LiveModel& model, const std::vector<ui
             throw InputError::atByte(reader.path(), reader.page(pages[i]).offset, fault);
     });
     bool any = false;
-    for (size_t i = 0; i < pages.size(); ++i) any |= model.arrive(pages[i], std::move(decoded[i]));
+    for (size_t i = 0; i < pages.size(); ++i) any |= model.arrive(pages[i], decoded[i].get());
     return any;
 }
 

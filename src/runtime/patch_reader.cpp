@@ -15,8 +15,7 @@ namespace pietra {
 void requirePatches(const ModelReader& model) {
     if (!model.hasPatches())
         throw InputError(model.path(), "",
-                         fmt::format("models of the method {} cannot be drawn yet; pietra extract "
-                                     "makes meshes of them",
+                         fmt::format("models of the method {} cannot be drawn so",
                                      model.info().method));
 }
 

@@ -1,5 +1,9 @@
 #include "apps/pietra/model_files.h"
 
+#include <algorithm>
+
+#include "methods/method_table.h"
+
 namespace pietra {
 
 ModelFiles::ModelFiles(const std::vector<std::string>& paths) {
@@ -21,6 +25,11 @@ std::vector<Sphere> ModelFiles::balls() const {
                                  float(node.saturated.radius * lattice.step)});
     }
     return balls;
+}
+
+bool ModelFiles::proveErrors() const {
+    return std::all_of(models.begin(), models.end(),
+                       [](const auto& model) { return provesErrors(model->info()); });
 }
 
 std::vector<const ModelReader*> ModelFiles::views() const {

@@ -20,6 +20,8 @@ struct ModelFiles {
     /// Balls that hold all models, some tens or hundreds, in input coordinates.
     std::vector<Sphere> balls() const;
     std::vector<const ModelReader*> views() const;
+    /// Of all of them, the errors stated are proven bounds.
+    bool proveErrors() const;
 };
 
 }  // namespace pietra

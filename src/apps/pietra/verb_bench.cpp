@@ -45,7 +45,7 @@ private:
     FlightRecord flyOnce(const ModelFiles& files, const CameraPath& path,
                          const FlightSettings& settings, const char* stage,
                          Progress& progress) const;
-    Json report(const BenchRecord& record, const CameraPath& path) const;
+    Json report(const BenchRecord& record, const CameraPath& path, bool proven) const;
 
     std::vector<std::string> files_;
     std::string path_;
@@ -166,12 +166,13 @@ std::string sentence(const FlightRecord& record, const Json& summary) {
         record.converged_ms);
 }
 
-Json BenchVerb::report(const BenchRecord& record, const CameraPath& path) const {
+Json BenchVerb::report(const BenchRecord& record, const CameraPath& path, bool proven) const {
     Json report{
         {"model", files_.size() == 1 ? Json(files_[0]) : Json(files_)},
         {"renderer", renderer_},
         {"size", {size_.width, size_.height}},
         {"pixels", pixels_},
+        {"errors_proven", proven},
         {"about", fmt::format("{}, {}x{}, {} px, {} samples, {} for pages, {}{}; {}", path_,
                               size_.width, size_.height, pixels_, samples_, formatBytes(ram_),
                               renderer_, cold_ ? ", cold" : "", machine())}};
@@ -237,7 +238,7 @@ int BenchVerb::run(const RunContext& context) {
             flyOnce(files, camera_path, flight, "fly without drawing", context.progress);
     }
     for (const std::string& fault : record.flight.faults) logWarning(fault);
-    const Json json = report(record, camera_path);
+    const Json json = report(record, camera_path, files.proveErrors());
     logInfo(sentence(record.flight, json["summary"]));
     writeReport(context.common.report, json, context.common.force);
     if (!html_.empty()) writeText(html_, flightPage(record, json), context.common.force);

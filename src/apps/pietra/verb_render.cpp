@@ -47,7 +47,7 @@ private:
     OfflineSettings settings(const ModelFiles& files) const;
     void showScalar(const ModelFiles& files, ShadeSettings& shade) const;
     OfflinePicture draw(const ModelFiles& files, const Camera& camera, Progress& progress) const;
-    Json report(const OfflineStatistics& statistics, size_t resident_bytes) const;
+    Json report(const OfflineStatistics& statistics, bool proven, size_t resident_bytes) const;
 
     std::vector<std::string> files_;
     std::string output_;
@@ -195,7 +195,7 @@ OfflineSettings RenderVerb::settings(const ModelFiles& files) const {
     return settings;
 }
 
-Json RenderVerb::report(const OfflineStatistics& s, size_t resident_bytes) const {
+Json RenderVerb::report(const OfflineStatistics& s, bool proven, size_t resident_bytes) const {
     return {{"triangles", s.triangles},
             {"patches", s.patches},
             {"pixels_covered", s.pixels_covered},
@@ -206,7 +206,8 @@ Json RenderVerb::report(const OfflineStatistics& s, size_t resident_bytes) const
               {"draw", s.draw_ms},
               {"total", s.total_ms}}},
             {"resident_bytes", {{"ram", resident_bytes}, {"vram", s.device_bytes}}},
-            {"tolerance_px", s.tolerance_px}};
+            {"tolerance_px", s.tolerance_px},
+            {"errors_proven", proven}};
 }
 
 OfflinePicture RenderVerb::draw(const ModelFiles& files, const Camera& camera,
@@ -239,10 +240,10 @@ int RenderVerb::run(const RunContext& context) {
     logInfo(fmt::format("{}: {} triangles in {} patches, {:.0f} ms", output_,
                         formatCount(double(drawn.statistics.triangles)), drawn.statistics.patches,
                         drawn.statistics.total_ms));
-    writeReport(
-        context.common.report,
-        report(drawn.statistics, resident > resident_before ? resident - resident_before : 0),
-        context.common.force);
+    writeReport(context.common.report,
+                report(drawn.statistics, files.proveErrors(),
+                       resident > resident_before ? resident - resident_before : 0),
+                context.common.force);
     return 0;
 }
 

@@ -11,7 +11,7 @@ namespace pietra::pmesh {
 namespace {
 
 /// Triangles of a chunk. Fewer cost more vertices on borders, more mean more to make anew.
-constexpr size_t kMost = 3000, kFew = 200;
+constexpr size_t kMost = 2048, kFew = 128;
 constexpr uint32_t kNone = ~0u;
 
 /// Damage may take a vertex anywhere; renderers rely on 21 bits. Rounding alone takes none so far
@@ -51,11 +51,19 @@ void DrawChunks::update(ActiveMesh& mesh) {
     for (const uint32_t c : changed) face_[c].clear();
 }
 
-/// The faces of what has changed.
+/// The faces of what has changed, in their order.
 void DrawChunks::list(const ActiveMesh& mesh) {
+    constexpr size_t kSlice = 1 << 14;
     for (auto& faces : face_) faces.clear();
-    for (uint32_t f = 0; f < mesh.faceCount(); ++f)
-        if (const uint32_t c = mesh.face[f].chunk(); mesh.chunk_touched[c]) face_[c].push_back(f);
+    slice_.resize((mesh.faceCount() + kSlice - 1) / kSlice);
+    parallelFor(slice_.size(), [&](size_t i) {
+        slice_[i].clear();
+        const size_t end = std::min(mesh.faceCount(), (i + 1) * kSlice);
+        for (size_t f = i * kSlice; f < end; ++f)
+            if (mesh.chunk_touched[mesh.face[f].chunk()]) slice_[i].push_back(uint32_t(f));
+    });
+    for (const auto& faces : slice_)
+        for (const uint32_t f : faces) face_[mesh.face[f].chunk()].push_back(f);
 }
 
 /// To the first one that it borders on and that has room for it. False if there is none.

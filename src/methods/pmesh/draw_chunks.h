@@ -30,7 +30,8 @@ private:
     void make(const ActiveMesh& mesh, uint32_t chunk);
 
     std::vector<LiveChunk> chunk_;
-    std::vector<std::vector<uint32_t>> face_;  // of each chunk that has changed
+    std::vector<std::vector<uint32_t>> face_;   // of each chunk that has changed
+    std::vector<std::vector<uint32_t>> slice_;  // scratch
     std::vector<uint32_t> unused_;
     uint64_t version_ = 0;
 };

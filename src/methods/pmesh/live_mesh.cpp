@@ -68,11 +68,11 @@ public:
         if (!decodeNode(bytes, page, rows_[page], decoded->node, fault)) return nullptr;
         return decoded;
     }
-    bool arrive(uint32_t page, std::unique_ptr<LivePage> decoded) override;
+    bool arrive(uint32_t page, const LivePage* decoded) override;
     const LiveFrame& adapt(const LiveTask& task) override;
     std::span<const LiveChunk> chunks() const override { return chunks_.chunks(); }
     std::vector<uint32_t> requests(size_t most) const override { return nodes_.requests(most); }
-    std::vector<uint32_t> prefetch(const View& view, double pixels, size_t most) const override {
+    std::vector<uint32_t> prefetch(const View& view, double pixels, size_t most) override {
         return nodes_.prefetch(criterionFor(view, lattice(), pixels), most);
     }
     size_t bytes() const override { return nodes_.loaded() * kNodeBytes + meshBytes(); }
@@ -94,8 +94,8 @@ private:
     std::vector<std::string> faults_;
 };
 
-bool LiveMesh::arrive(uint32_t page, std::unique_ptr<LivePage> decoded) {
-    if (decoded) return nodes_.arrive(page, static_cast<const NodePage&>(*decoded).node);
+bool LiveMesh::arrive(uint32_t page, const LivePage* decoded) {
+    if (decoded) return nodes_.arrive(page, static_cast<const NodePage*>(decoded)->node);
     nodes_.giveUp(page);
     return true;
 }
@@ -124,7 +124,10 @@ const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
     frame_.operations = counts.operations();
     frame_.busy = !counts.finished;
     frame_.missing = nodes_.requests(~size_t(0)).size();
-    frame_.needed_bytes = nodes_.required() * kNodeBytes + meshBytes();
+    // What is needed is counted only where it may be too much.
+    frame_.needed_bytes = bytes() + frame_.missing * kNodeBytes;
+    if (frame_.needed_bytes > task.most_bytes / 2)
+        frame_.needed_bytes = nodes_.required() * kNodeBytes + meshBytes();
     frame_.triangles = adaption_.mesh().faceCount();
     const bool is_short = counts.finished && counts.short_of_room;
     frame_.short_of_triangles = is_short && drawable <= in_memory;

@@ -33,12 +33,16 @@ Reference ResidentNodes::referenceTo(OperationId id) const {
     return {levels[side][slotIn(id)], row_[n].radius, row_[n].error, row_[n].centre};
 }
 
-/// Nodes whose operations are applied: of each vertex the one that made it, and its last one.
-void ResidentNodes::pin(const ActiveMesh& mesh) {
+/// Nodes whose operations are applied: of each vertex the one that made it, and its last one. Done
+/// only when it matters.
+void ResidentNodes::pin() {
+    if (unpinned_ == nullptr) return;
+    const ActiveMesh& mesh = *std::exchange(unpinned_, nullptr);
     for (NodeIndex n = 0; n < row_.size(); ++n) state_[n].is_pinned = row_[n].parent == kNoNode;
     const auto base = uint32_t(mesh_.base_vertex.size());
     const auto pinNodeOf = [&](OperationId o) {
-        std::atomic_ref(state_[nodeOf(o)].is_pinned).store(true, std::memory_order_relaxed);
+        const std::atomic_ref pinned(state_[nodeOf(o)].is_pinned);
+        if (!pinned.load(std::memory_order_relaxed)) pinned.store(true, std::memory_order_relaxed);
     };
     parallelForSlices(mesh.vertexCount(), 4096, [&](size_t begin, size_t end) {
         for (size_t v = begin; v < end; ++v) {
@@ -48,30 +52,41 @@ void ResidentNodes::pin(const ActiveMesh& mesh) {
     });
     // Rows lie parents before children.
     for (NodeIndex n = NodeIndex(row_.size()); n-- > 0;)
-        if (state_[n].is_pinned && row_[n].parent != kNoNode)
-            state_[row_[n].parent].is_pinned = true;
+        if (state_[n].is_pinned) {
+            state_[n].last_used = frame_;
+            if (row_[n].parent != kNoNode) state_[row_[n].parent].is_pinned = true;
+        }
 }
 
 void ResidentNodes::note(const Adaption& adaption) {
     ++frame_;
     victims_.reset();
-    pin(adaption.mesh());
+    unpinned_ = &adaption.mesh();
     std::vector<NodeIndex> asked;
-    for (const Adaption::Waiting& w : adaption.waiting())
-        if (mesh_.isLoaded(w.operation)) {
-            state_[nodeOf(w.operation)].is_in_use = true;
-        } else if (!state_[nodeOf(w.operation)].is_bad) {
-            asked.push_back(nodeOf(w.operation));
+    for (const Adaption::Waiting& w : adaption.waiting()) {
+        const NodeIndex n = nodeOf(w.operation);
+        if (isLoaded(n)) {
+            state_[n].last_used = frame_;
+        } else if (!state_[n].is_bad) {
+            asked.push_back(n);
         }
+    }
     std::sort(asked.begin(), asked.end());
     asked.erase(std::unique(asked.begin(), asked.end()), asked.end());
     for (const NodeIndex n : asked_)
         if (!std::binary_search(asked.begin(), asked.end(), n)) state_[n].asked = 0;
     for (const NodeIndex n : asked) ++state_[n].asked;
-    required_ = asked.size();
-    for (State& s : state_)
-        if (std::exchange(s.is_in_use, false) || s.is_pinned) s.last_used = frame_, ++required_;
     asked_ = std::move(asked);
+    constexpr uint32_t kFramesUnpinned = 16;  // else what is in use looks as if it were not
+    if (frame_ % kFramesUnpinned == 0) pin();
+}
+
+size_t ResidentNodes::required() {
+    pin();
+    size_t required = 0;
+    for (NodeIndex n = 0; n < row_.size(); ++n) required += state_[n].last_used == frame_;
+    for (const NodeIndex n : asked_) required += state_[n].last_used != frame_;
+    return required;
 }
 
 std::vector<NodeIndex> ResidentNodes::requests(size_t most) const {
@@ -84,22 +99,27 @@ std::vector<NodeIndex> ResidentNodes::requests(size_t most) const {
     return nodes;
 }
 
-std::vector<NodeIndex> ResidentNodes::prefetch(const Criterion& criterion, size_t most) const {
+std::vector<NodeIndex> ResidentNodes::prefetch(const Criterion& criterion, size_t most) {
     std::vector<NodeIndex> nodes;
     size_t room = most_ - std::min<size_t>(most_, loaded_);
     for (NodeIndex n = 0; n < row_.size(); ++n)
-        room += mayLeave(n) && state_[n].last_used + kFramesKept < frame_;
+        room += isLoaded(n) && state_[n].last_used + kFramesKept < frame_;
+    std::vector<uint8_t> is_there(row_.size());
     for (NodeIndex n = 0; n < row_.size() && nodes.size() < std::min(most, room); ++n) {
         const NodeRow& row = row_[n];
-        if (!isLoaded(n) && !state_[n].is_bad && isLoaded(row.parent) &&
-            criterion.needs(row.centre, row.error, row.radius))
-            nodes.push_back(n);
+        is_there[n] = isLoaded(n);
+        if (is_there[n] || state_[n].is_bad || !is_there[row.parent] ||
+            !criterion.needs(row.centre, row.error, row.radius))
+            continue;
+        is_there[n] = 1;
+        nodes.push_back(n);
     }
     return nodes;
 }
 
 bool ResidentNodes::evictOldest() {
     if (!victims_) {
+        pin();
         victims_.emplace();
         for (NodeIndex n = 0; n < row_.size(); ++n)
             if (mayLeave(n)) victims_->push_back(n);
@@ -150,6 +170,7 @@ bool ResidentNodes::arrive(NodeIndex index, const OperationNode& node) {
 }
 
 bool ResidentNodes::evict(NodeIndex index) {
+    pin();
     State& s = state_[index];
     if (!isLoaded(index) || s.is_pinned || s.loaded_children > 0) return false;
     free_place_.push_back(mesh_.place_of_node[index]);

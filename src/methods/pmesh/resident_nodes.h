@@ -46,13 +46,14 @@ public:
     const ProgressiveMesh& mesh() const { return mesh_; }
     Reference referenceTo(OperationId id) const override;
 
-    /// After each frame. Loaded nodes must not have changed since.
+    /// After each frame. Loaded nodes must not have changed since; and the mesh must not change
+    /// between this and what is asked of nodes until the next frame.
     void note(const Adaption& adaption);
     /// At most so many, none loaded, in the order of need.
     std::vector<NodeIndex> requests(size_t most) const;
-    /// At most so many of those that this would need first, whose parents are there, and which fit
-    /// without those used lately.
-    std::vector<NodeIndex> prefetch(const Criterion& criterion, size_t most) const;
+    /// At most so many of those that this may need, as far as their rows tell, parents first, and
+    /// which fit without those used lately.
+    std::vector<NodeIndex> prefetch(const Criterion& criterion, size_t most);
     /// A node without faults by itself. False, and nothing done, where it has no room or is not
     /// wanted: its parent has left, or it does not fit it.
     [[nodiscard]] bool arrive(NodeIndex index, const OperationNode& node);
@@ -68,7 +69,7 @@ public:
         return mesh_.place_of_node[n] != ProgressiveMesh::kNotLoaded;
     }
     size_t loaded() const { return loaded_; }
-    size_t required() const { return required_; }  ///< in use or asked for, by the last frame
+    size_t required();  ///< in use or asked for, by the last frame
 
 private:
     struct State {
@@ -76,12 +77,11 @@ private:
         uint32_t last_used = 0;  ///< the frame
         uint8_t loaded_children = 0;
         bool is_pinned = false;  ///< must stay
-        bool is_in_use = false;  ///< by what waits for others
         bool is_bad = false;
     };
     static constexpr uint32_t kFramesKept = 60;  ///< for what is only prefetched
 
-    void pin(const ActiveMesh& mesh);
+    void pin();
     bool makeRoom();
     bool mayLeave(NodeIndex n) const {
         const State& s = state_[n];
@@ -97,7 +97,8 @@ private:
     std::optional<std::vector<NodeIndex>> victims_;  // of this frame, the last one first
     uint32_t most_;
     uint32_t frame_ = 0;
-    size_t loaded_ = 0, required_ = 0;
+    const ActiveMesh* unpinned_ = nullptr;  ///< the frame's, whose nodes are not pinned yet
+    size_t loaded_ = 0;
 };
 
 }  // namespace pietra::pmesh
