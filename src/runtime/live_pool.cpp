@@ -104,14 +104,9 @@ void LivePool::load(size_t free_bytes) {
     for (uint32_t i = 0; i < parts_.size(); ++i)
         want(i, parts_[i].model->requests(kMostWanted / parts_.size()), true);
     for (const int which : {0, 1})
-<<<<<<< HEAD
-        for (uint32_t i = 0; i < parts_.size(); ++i) want(i, parts_[i].ahead[which]);
+        for (uint32_t i = 0; i < parts_.size(); ++i) want(i, parts_[i].ahead[which], false);
     std::vector<std::vector<Mesh>> none;
     loader_->want(wanted_, none);
-=======
-        for (uint32_t i = 0; i < parts_.size(); ++i) want(i, parts_[i].ahead[which], false);
-    loader_->want(wanted_);
->>>>>>> 60df7d7 (tests: Scenes of adapted meshes: valid in any budget, damage, mixed, own memory)
 }
 
 void LivePool::prefetch(size_t i, const View& view, double pixels, bool next_level) {
