@@ -18,6 +18,8 @@ namespace {
 
 /// Of a pass while time is short: some milliseconds.
 constexpr size_t kPassOperations = 4096;
+/// Of a frame: more than any model needs, should a damaged one go back and forth.
+constexpr int kMostPasses = 1 << 14;
 
 struct NodePage : LivePage {
     OperationNode node;
@@ -105,6 +107,7 @@ const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
     FrameLimits limits;
     limits.milliseconds = task.milliseconds;
     limits.operations = kPassOperations;
+    limits.passes = kMostPasses;
     const size_t node_bytes = nodes_.loaded() * kNodeBytes;
     // A vertex more is two triangles more, at most.
     const ProgressiveMesh& mesh = nodes_.mesh();
