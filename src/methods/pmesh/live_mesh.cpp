@@ -16,8 +16,8 @@
 namespace pietra::pmesh {
 namespace {
 
-/// Of a pass while time is short: some milliseconds.
-constexpr size_t kPassOperations = 4096;
+/// Of a pass: a millisecond or two, as time is looked at in between.
+constexpr size_t kPassOperations = 2048;
 /// Of a frame: more than any model needs, should a damaged one go back and forth.
 constexpr int kMostPasses = 1 << 14;
 
