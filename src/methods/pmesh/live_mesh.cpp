@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "methods/pmesh/adaption.h"
 #include "methods/pmesh/draw_chunks.h"
 #include "methods/pmesh/model.h"
@@ -91,6 +92,7 @@ private:
     ResidentNodes nodes_;
     Adaption adaption_;
     DrawChunks chunks_;
+    double chunks_ms_ = 0;  // of the last frame
     LiveFrame frame_;
     std::string path_;
     std::vector<std::string> faults_;
@@ -105,7 +107,8 @@ bool LiveMesh::arrive(uint32_t page, const LivePage* decoded) {
 const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
     const Criterion criterion = criterionFor(*task.view, lattice(), task.pixels);
     FrameLimits limits;
-    limits.milliseconds = task.milliseconds;
+    // Where much changes, chunks take a part of the time.
+    limits.milliseconds = std::max(task.milliseconds - chunks_ms_, task.milliseconds / 4);
     limits.operations = kPassOperations;
     limits.passes = kMostPasses;
     const size_t node_bytes = nodes_.loaded() * kNodeBytes;
@@ -122,7 +125,9 @@ const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
     nodes_.setMost(
         (task.most_bytes + task.arriving_bytes - std::min(task.most_bytes, meshBytes())) /
         kNodeBytes);
+    const Stopwatch watch;
     chunks_.update(adaption_.mesh());
+    chunks_ms_ = watch.ms();
 
     frame_.operations = counts.operations();
     frame_.busy = !counts.finished;
