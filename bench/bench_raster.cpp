@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "render/gl/context.h"
+#include "gpu/context.h"
 #include "render/gl/renderer.h"
 #include "render/raster/rasteriser.h"
 #include "render/raster/test_meshes.h"

@@ -7,7 +7,7 @@ The rules:
 - The order of add_subdirectory() in CMakeLists.txt is the order of layers: a module may declare
   (add_module DEPENDS) only modules above it.
 - A file may include headers of its own folder and of declared modules, by the path from src/.
-- No method depends on another method; runtime and render/ depend on no method.
+- No method depends on another method (a folder in a method's own is of that method); runtime and render/ depend on no method.
 """
 
 import re
@@ -65,7 +65,7 @@ def check_declarations(modules):
             other = above.get(name)
             if not other:
                 faults.append(f"{where}: {module.name} depends on {name}, which is not above it")
-            elif is_method(other) and is_method(module):
+            elif is_method(other) and is_method(module) and not module.folder.startswith(other.folder + "/"):
                 faults.append(f"{where}: the method {module.name} depends on the method {name}")
             elif other.folder.startswith("methods") and re.match(r"(runtime|render)\b", module.folder):
                 faults.append(f"{where}: {module.name} must not know methods, but depends on {name}")

@@ -9,7 +9,7 @@
 #include <memory>
 #include <string>
 
-#include "render/gl/context.h"
+#include "gpu/context.h"
 #include "render/live/live_renderer.h"
 
 namespace pietra {

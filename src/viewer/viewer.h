@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "gpu/context.h"
 #include "multires/standard_views.h"
-#include "render/gl/context.h"
 #include "runtime/scene.h"
 
 namespace pietra {

@@ -5,8 +5,8 @@
 
 #include "apps/pietra/verb.h"
 #include "base/error.h"
+#include "gpu/context.h"
 #include "multires/cut.h"
-#include "render/gl/context.h"
 
 namespace pietra {
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "render/gl/context.h"
+#include "gpu/context.h"
 #include "render/shading.h"
 #include "runtime/camera_path.h"
 #include "runtime/scene.h"

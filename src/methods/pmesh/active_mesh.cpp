@@ -17,15 +17,6 @@ namespace {
 constexpr size_t kGrain = 256;
 constexpr auto kRelaxed = std::memory_order_relaxed;
 
-/// At most the radius that remains of the operation's sphere around its u.
-uint16_t radiusAroundU(const Operation& o) {
-    const Vec3d d(o.offset(o.isDummy() ? 0 : 1));
-    const int64_t rest = int64_t(decodeRadius(o.radius)) - int64_t(std::sqrt(glm::dot(d, d))) - 1;
-    if (rest <= 0) return 0;
-    const uint32_t code = encodeRoundedUp<11>(uint64_t(rest));
-    return uint16_t(decodeRadius(code) > rest ? code - 1 : code);
-}
-
 /// Six bits of x, every third bit of the result.
 uint32_t spread(uint32_t x) {
     uint32_t bits = x & 0x3f;
@@ -60,6 +51,14 @@ void permute(std::vector<T>& elements, const std::vector<uint32_t>& place) {
 }
 
 }  // namespace
+
+uint16_t radiusAroundU(const Operation& o) {
+    const Vec3d d(o.offset(o.isDummy() ? 0 : 1));
+    const int64_t rest = int64_t(decodeRadius(o.radius)) - int64_t(std::sqrt(glm::dot(d, d))) - 1;
+    if (rest <= 0) return 0;
+    const uint32_t code = encodeRoundedUp<11>(uint64_t(rest));
+    return uint16_t(decodeRadius(code) > rest ? code - 1 : code);
+}
 
 ActiveMesh::ActiveMesh(const ProgressiveMesh& mesh, const References* references)
     : source_(&mesh), references_(references) {

@@ -84,6 +84,9 @@ struct VertexCriteria {
     static constexpr uint16_t kBlocked = 0x8000;
 };
 
+/// At most the radius that remains of the operation's sphere around its u: a code.
+uint16_t radiusAroundU(const Operation& o);
+
 /// The triangles around a vertex, counter-clockwise; where the fan is open, from its beginning.
 struct Star {
     static constexpr uint32_t kRoom = 24;

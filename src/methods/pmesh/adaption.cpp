@@ -11,8 +11,6 @@
 namespace pietra::pmesh {
 namespace {
 
-/// Operations after which sorting may pay: what fits the second-level cache needs none.
-constexpr size_t kLeastSort = 4096;
 constexpr size_t kGrain = 256;  // operations
 constexpr size_t kTogether = ActiveMesh::kTogether;
 
@@ -33,6 +31,7 @@ PassCounts Adaption::frame(const Criterion& criterion, const FrameLimits& limits
     const Stopwatch watch;
     const uint32_t refused_before = refused_;
     criterion_ = criterion;
+    if (wear_.takeIfOver(mesh_.vertexCount())) mesh_.sortInSpace();
     scan();
     PassCounts all;
     for (bool last = false; !last;) {
@@ -52,11 +51,7 @@ PassCounts Adaption::frame(const Criterion& criterion, const FrameLimits& limits
     all.merges -= std::min(all.merges, refused_ - refused_before);
     listWaiting();
     tidy();
-    since_sort_ += all.operations();
-    if (since_sort_ > std::max(kLeastSort, 4 * mesh_.vertexCount())) {
-        mesh_.sortInSpace();
-        since_sort_ = 0;
-    }
+    wear_.add(all.operations());
     return all;
 }
 

@@ -12,8 +12,8 @@
 //   3. All splits and merges are done, new elements in free places, in the order of the vertices.
 // Each vertex counts the neighbours that it must wait for (VertexPulse::around); when none is left,
 // it is looked at in the next pass. So passes go on from what the last one changed.
-// At a frame's end the last elements move into the places that merges left; after as many
-// operations as there are vertices, all are sorted in space.
+// At a frame's end the last elements move into the places that merges left; a frame after many
+// operations begins with sorting all in space.
 //
 // The set of operations applied when nothing is left to do is the least one that holds all that is
 // needed and is closed under dependency: it depends on the criterion alone, not on what was before.
@@ -25,6 +25,7 @@
 // The arrays after each pass are the same for any number of threads. A frame with nothing to do
 // reads 24 bytes a vertex. Not thread-safe.
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <limits>
@@ -51,6 +52,22 @@ struct FrameLimits {
     double milliseconds = std::numeric_limits<double>::infinity();  ///< then no pass begins
     size_t operations = ~size_t(0);                                 ///< of a pass, of each kind
     size_t vertices = ~size_t(0);                                   ///< of the mesh, at any time
+};
+
+/// Operations scatter what belongs together over the arrays; after some, sorting pays.
+class Wear {
+public:
+    void add(size_t operations) { since_sort_ += operations; }
+    /// If so, they are to be sorted.
+    bool takeIfOver(size_t vertices) {
+        const bool over = since_sort_ > std::max(kLeast, 4 * vertices);
+        if (over) since_sort_ = 0;
+        return over;
+    }
+
+private:
+    static constexpr size_t kLeast = 4096;  ///< what fits the second-level cache needs none
+    size_t since_sort_ = 0;
 };
 
 class Adaption {
@@ -133,7 +150,7 @@ private:
     std::vector<Split> split_;
     std::vector<Merge> merge_;
     std::vector<uint32_t> free_vertex_, free_face_;
-    size_t since_sort_ = 0;  ///< operations
+    Wear wear_;
     bool short_of_room_ = false;
     std::atomic<uint32_t> refused_{0};
 };

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "render/gl/shader_text.h"
+
 namespace pietra {
 namespace {
 

@@ -4,8 +4,8 @@
 
 #include <array>
 
+#include "gpu/program.h"
 #include "render/gl/page_format.h"
-#include "render/gl/program.h"
 #include "render/shading.h"
 
 namespace pietra {

@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include "render/gl/shader_text.h"
+
 namespace pietra {
 namespace {
 

@@ -11,8 +11,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "gpu/program.h"
 #include "render/gl/frame_block.h"
-#include "render/gl/program.h"
 
 namespace pietra {
 

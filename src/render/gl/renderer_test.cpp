@@ -10,7 +10,7 @@
 #include <random>
 
 #include "base/check.h"
-#include "render/gl/test_context.h"
+#include "gpu/test_context.h"
 #include "render/gl/test_pictures.h"
 #include "render/raster/rasteriser.h"
 #include "render/raster/test_meshes.h"

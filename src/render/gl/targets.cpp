@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "base/check.h"
+#include "render/gl/shader_text.h"
 
 namespace pietra {
 namespace {

@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
+#include "gpu/program.h"
 #include "multires/view.h"
 #include "render/gl/frame_block.h"
-#include "render/gl/program.h"
 #include "render/gl/upload_ring.h"
 #include "render/picture.h"
 #include "render/shading.h"

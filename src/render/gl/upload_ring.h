@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <deque>
 
-#include "render/gl/program.h"
+#include "gpu/program.h"
 
 namespace pietra {
 

@@ -1,7 +1,7 @@
 #pragma once
 // Pictures of a scene by OpenGL, in a context of its own or in a window's.
 
-#include "render/gl/context.h"
+#include "gpu/context.h"
 #include "render/gl/renderer.h"
 #include "render/live/live_renderer.h"
 

@@ -2,7 +2,7 @@
 #include <thread>
 
 #include "base/scratch_directory.h"
-#include "render/gl/test_context.h"
+#include "gpu/test_context.h"
 #include "render/gl/test_pictures.h"
 #include "render/live/gl_live.h"
 #include "runtime/scene.h"

@@ -4,7 +4,7 @@
 
 #include "base/check.h"
 #include "base/stopwatch.h"
-#include "render/gl/context.h"
+#include "gpu/context.h"
 #include "render/gl/renderer.h"
 #include "render/offline/batch_drawer.h"
 #include "render/offline/gl_thread.h"

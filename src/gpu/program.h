@@ -1,5 +1,5 @@
 #pragma once
-// Small owners of OpenGL's objects, and programs made from the files of shaders/. All need a
+// Small owners of OpenGL's objects, and programs made from files of text. All need a
 // current context, also to be destroyed.
 
 #include <epoxy/gl.h>
@@ -12,23 +12,23 @@
 namespace pietra {
 
 /// Move-only owner of a name; `destroy` is called with it unless it is 0.
-template <void (*destroy)(GLuint)>
+template <auto destroy, class Name = GLuint>
 class GlObject {
 public:
     GlObject() = default;
-    explicit GlObject(GLuint name) : name_(name) {}
-    GlObject(GlObject&& other) noexcept : name_(std::exchange(other.name_, 0)) {}
+    explicit GlObject(Name name) : name_(name) {}
+    GlObject(GlObject&& other) noexcept : name_(std::exchange(other.name_, Name{})) {}
     GlObject& operator=(GlObject&& other) noexcept {
         std::swap(name_, other.name_);
         return *this;
     }
     ~GlObject() {
-        if (name_ != 0) destroy(name_);
+        if (name_ != Name{}) destroy(name_);
     }
-    operator GLuint() const { return name_; }
+    operator Name() const { return name_; }
 
 private:
-    GLuint name_ = 0;
+    Name name_{};
 };
 
 inline void deleteBuffer(GLuint name) {
@@ -53,6 +53,10 @@ inline void deleteShader(GLuint name) {
     glDeleteShader(name);
 }
 
+inline void deleteFence(GLsync name) {
+    glDeleteSync(name);
+}
+
 using GlBuffer = GlObject<deleteBuffer>;
 using GlTexture = GlObject<deleteTexture>;
 using GlFramebuffer = GlObject<deleteFramebuffer>;
@@ -60,15 +64,21 @@ using GlVertexArray = GlObject<deleteVertexArray>;
 using GlQuery = GlObject<deleteQuery>;
 using GlProgram = GlObject<deleteProgram>;
 using GlShader = GlObject<deleteShader>;
+using GlFence = GlObject<deleteFence, GLsync>;
 
-/// One stage of a program: files of shaders/, read one after the other.
+/// One stage of a program: files of text, read one after the other.
 struct GlStage {
     GLenum kind;
     std::initializer_list<std::string_view> files;
 };
 
+/// The text of a file that CMake has put into the program (cmake/embed_text.cmake); empty where
+/// there is none.
+using GlTexts = std::string_view (*)(std::string_view name);
+
 /// Compiles and links. `defines`: lines put before the files of each stage. A shader that does not
 /// compile is a bug of Pietra, or of the driver: throws BugError with the driver's words.
-GlProgram makeProgram(std::initializer_list<GlStage> stages, std::string_view defines = {});
+GlProgram makeProgram(GlTexts text_of, std::initializer_list<GlStage> stages,
+                      std::string_view defines = {});
 
 }  // namespace pietra

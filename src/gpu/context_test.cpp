@@ -1,11 +1,11 @@
-#include "render/gl/context.h"
+#include "gpu/context.h"
 
 #include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
 #include <thread>
 
-#include "render/gl/test_context.h"
+#include "gpu/test_context.h"
 
 namespace pietra {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "render/gl/context.h"
+#include "gpu/context.h"
 
 namespace pietra {
 

@@ -1,11 +1,10 @@
-#include "render/gl/program.h"
+#include "gpu/program.h"
 
 #include <fmt/format.h>
 
 #include <string>
 
 #include "base/check.h"
-#include "render/gl/shader_text.h"
 
 namespace pietra {
 namespace {
@@ -14,11 +13,11 @@ constexpr std::string_view kHead =
     "#version 450 core\n"
     "#extension GL_ARB_shader_draw_parameters : require\n";
 
-GlShader compile(const GlStage& stage, std::string_view defines) {
+GlShader compile(GlTexts text_of, const GlStage& stage, std::string_view defines) {
     std::string source = fmt::format("{}{}", kHead, defines);
     std::string names;
     for (const std::string_view file : stage.files) {
-        const std::string_view text = embeddedText(file);
+        const std::string_view text = text_of(file);
         CHECK(!text.empty());
         source += fmt::format("#line 1\n{}", text);
         names += fmt::format(" {}", file);
@@ -41,9 +40,10 @@ GlShader compile(const GlStage& stage, std::string_view defines) {
 
 }  // namespace
 
-GlProgram makeProgram(std::initializer_list<GlStage> stages, std::string_view defines) {
+GlProgram makeProgram(GlTexts text_of, std::initializer_list<GlStage> stages,
+                      std::string_view defines) {
     GlProgram program(glCreateProgram());
-    for (const GlStage& stage : stages) glAttachShader(program, compile(stage, defines));
+    for (const GlStage& stage : stages) glAttachShader(program, compile(text_of, stage, defines));
     glLinkProgram(program);
     GLint done = 0;
     glGetProgramiv(program, GL_LINK_STATUS, &done);

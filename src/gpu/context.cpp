@@ -1,4 +1,4 @@
-#include "render/gl/context.h"
+#include "gpu/context.h"
 
 #include <fmt/format.h>
 
