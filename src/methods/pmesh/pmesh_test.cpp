@@ -125,10 +125,7 @@ TEST(PmeshCodes, OffsetsLoseAtMostHalfAStepOfTheirShift) {
 }
 
 TEST(PmeshBuild, DummiesMoveWhatWouldBeTooCoarse) {
-    // Long edges with short ones beside them: every other row of a sheet lies close to the next.
-    test::Shape sheet = test::gridShape(24, 0.05);
-    for (Vec3d& p : sheet.position) p.y += std::llround(p.y * 24) % 2 == 1 ? 0.99 / 24 : 0.0;
-    const Built built = buildFor(onLattice(sheet, 1 << 20));
+    const Built built = buildFor(onLattice(closeRows(24), 1 << 20));
     EXPECT_GT(built.counts.dummies, 0u);
     EXPECT_EQ(validate(built.mesh), "");
 }

@@ -52,6 +52,14 @@ inline test::Shape dented(test::Shape shape, double amplitude) {
     return shape;
 }
 
+/// Long edges with short ones beside them: every other row of a sheet lies close to the next. What
+/// moves along the former is too coarse for the latter, without dummies.
+inline test::Shape closeRows(int rows) {
+    test::Shape sheet = test::gridShape(rows, 0.05);
+    for (Vec3d& p : sheet.position) p.y += std::llround(p.y * rows) % 2 == 1 ? 0.99 / rows : 0.0;
+    return sheet;
+}
+
 inline std::vector<TestMesh> testMeshes() {
     using namespace test;
     return {
