@@ -30,7 +30,6 @@ struct Places {
     uint32_t gone, gone_blocks_at, hole_blocks_at;
     uint32_t from, to, rank;
     uint32_t result_blocks, face_capacity, gone_blocks, hole_blocks;
-    uint32_t is_whole;
 };
 
 /// The same as in criterion.glsl.
@@ -177,7 +176,6 @@ void GlAdaption::makePlaces(const ProgressiveMesh& mesh) {
     p.gone = room(2 * size_t(f) / 32);
     p.gone_blocks_at = room(2 * p.gone_blocks), p.hole_blocks_at = room(2 * p.hole_blocks);
     p.from = room(2 * size_t(f)), p.to = room(2 * size_t(f)), p.rank = room(f);
-    p.is_whole = 1;
     CHECK(end <= ~0u);
     places_ = makeBuffer(sizeof p, &p);
     work_ = makeBuffer(4 * end);

@@ -5,13 +5,13 @@
 // A frame is a fixed list of steps that find their work in the GPU's own counts: nothing waits for
 // an answer. What a frame has done can be asked for when the GPU has come to it.
 //
-// The shaders follow adaption.cpp and active_mesh.cpp function by function; what differs:
-//   - sets are taken in the order of the vertices from counts a block; those whose order does not
+// The shaders follow adaption.cpp and active_mesh.cpp function by function, by the same names; what
+// differs:
+//   - sets are taken in the order of the vertices by counts of a block; those whose order does not
 //     matter (fresh, released) are queues
-//   - rounds of forced marks: kRounds steps of many groups, then one group until there are none
+//   - rounds of forced marks: one of many groups, then one group until there are none
 //   - what comes free goes to rings.
-// 56 bytes a vertex and 32 a face are the mesh, 88 + 20 bytes are for finding work, 32 an
-// operation.
+// 56 bytes a vertex and 32 a face are the mesh, 32 an operation; 90 a vertex are for finding work.
 //
 // Needs the context in which it was made, current; also to be destroyed.
 
@@ -26,12 +26,12 @@ namespace pietra::pmesh {
 
 class GlAdaption {
 public:
-    /// The base mesh; validate() must find no fault in `mesh`, all of which must be loaded. It is
-    /// not used afterwards. `groups`: as many as fill the GPU. Throws MemoryError where the driver
-    /// has too little.
+    /// The base mesh; validate() and validateStars() must find no fault in `mesh`, all of which
+    /// must be loaded. It is not used afterwards. `groups`: as many as fill the GPU. Throws
+    /// MemoryError where the driver has too little.
     explicit GlAdaption(const ProgressiveMesh& mesh, uint32_t groups = 2048);
 
-    /// Adaption::frame(); returns before the GPU has done it.
+    /// Adaption::frame(); returns before the GPU has done it, but waits for the frame before.
     void frame(const Criterion& criterion, int most_passes);
     /// Adaption::settle(): waits now and then for what the GPU has to say.
     PassCounts settle(const Criterion& criterion);

@@ -32,7 +32,7 @@ layout(std430, binding = 6) WORK_ACCESS buffer State {
     uint may_merge, released;
     uint splits, merges;  // in this pass
     uint is_woken;        // 1: the pass before has found some that may split in this one
-    uint is_evaluated;    // 1: merges of this pass have been looked for, 2: and listed
+    uint is_evaluated;    // 1: merges of this pass have been looked for
     uint freed_vertices, freed_faces;
     uint all_splits, all_merges, passes;  // in this frame
     uint kept_vertices, kept_faces;       // at its end
@@ -54,7 +54,6 @@ layout(std140, binding = 0) uniform Places {
     uint at_gone, at_gone_blocks, at_hole_blocks;
     uint at_from, at_to, at_rank;  // those that move; the rank of one beyond
     uint result_blocks, face_capacity, gone_blocks, hole_blocks;
-    uint is_whole;
 };
 layout(std430, binding = 7) WORK_ACCESS buffer Work { uint work[]; };
 
