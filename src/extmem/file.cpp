@@ -113,6 +113,10 @@ void File::readAt(uint64_t offset, void* data, size_t bytes) const {
                                  fmt::format("the file ends early, {} bytes short", bytes - done));
 }
 
+void File::willRead(uint64_t offset, size_t bytes) const {
+    ::posix_fadvise(descriptor_, off_t(offset), off_t(bytes), POSIX_FADV_WILLNEED);
+}
+
 void File::write(const void* data, size_t bytes) {
     size_t done = 0;
     while (done < bytes) {

@@ -35,6 +35,8 @@ public:
     void readAt(uint64_t offset, void* data, size_t bytes) const;
     /// As readAt, but returns how many bytes there were before the end of the file.
     size_t readSomeAt(uint64_t offset, void* data, size_t bytes) const;
+    /// Tells the system that these bytes will be read soon; waits for nothing.
+    void willRead(uint64_t offset, size_t bytes) const;
     void write(const void* data, size_t bytes);
     void writeAt(uint64_t offset, const void* data, size_t bytes);
     void sync();

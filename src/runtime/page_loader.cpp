@@ -18,6 +18,9 @@ void stayInTheBackground() {
     ::sched_setscheduler(0, SCHED_BATCH, &none);
 }
 
+/// So many reads may be under way: as many as keep a disk busy.
+constexpr size_t kAdvised = 16;
+
 }  // namespace
 
 PageLoader::PageLoader(std::vector<PageSource> sources, int threads)
@@ -64,7 +67,7 @@ void PageLoader::take(std::vector<LoadedPage>& pages) {
 
 /// The next page to load; or none, after having freed meshes. False if there is nothing more to do,
 /// ever.
-bool PageLoader::next(std::optional<PageKey>& key) {
+bool PageLoader::next(std::optional<PageKey>& key, std::vector<PageKey>& upcoming) {
     std::vector<std::vector<Mesh>> dropped;
     std::unique_lock lock(mutex_);
     wake_.wait(lock, [&] { return stop_ || !queue_.empty() || !dropped_.empty(); });
@@ -78,7 +81,19 @@ bool PageLoader::next(std::optional<PageKey>& key) {
     key = queue_.front();
     queue_.pop_front();
     begun_.push_back(*key);
+    listUpcoming(upcoming);
     return true;
+}
+
+/// Those that are next, and the system has not been told of lately.
+void PageLoader::listUpcoming(std::vector<PageKey>& upcoming) {
+    upcoming.clear();
+    for (size_t i = 0; i < std::min(queue_.size(), kAdvised); ++i) {
+        if (std::find(advised_.begin(), advised_.end(), queue_[i]) != advised_.end()) continue;
+        upcoming.push_back(queue_[i]);
+        advised_.push_back(queue_[i]);
+        if (advised_.size() > 4 * kAdvised) advised_.pop_front();
+    }
 }
 
 void PageLoader::load(LoadedPage& page, std::vector<std::byte>& bytes) const {
@@ -94,8 +109,10 @@ void PageLoader::load(LoadedPage& page, std::vector<std::byte>& bytes) const {
 void PageLoader::work() {
     std::vector<std::byte> bytes;
     stayInTheBackground();
-    for (std::optional<PageKey> key; next(key);) {
+    std::vector<PageKey> upcoming;
+    for (std::optional<PageKey> key; next(key, upcoming);) {
         if (!key) continue;
+        for (const PageKey& page : upcoming) sources_[page.model].reader->willRead(page.page);
         LoadedPage loaded{*key, {}, {}, {}};
         load(loaded, bytes);
         bytes_read_ += bytes.size();

@@ -2,8 +2,9 @@
 // Threads that read and decode pages for a frame thread that never waits for them.
 //
 // The frame thread says each frame which pages are wanted, best first, after what no thread has
-// begun is forgotten. Decoded pages wait until they are taken. All functions but the destructor
-// return at once and are for one thread; the loader's threads end in the destructor.
+// begun is forgotten; the system is told of the next ones. Decoded pages wait until they are taken.
+// All functions but the destructor return at once and are for one thread; the loader's threads end
+// in the destructor.
 //
 // The frame thread never waits for a lock that a loader's thread may hold: that one runs in the
 // background, and may have lost its core for milliseconds. What is asked for then does not happen,
@@ -64,13 +65,15 @@ public:
 private:
     void work();
     void load(LoadedPage& page, std::vector<std::byte>& bytes) const;
-    bool next(std::optional<PageKey>& key);
+    bool next(std::optional<PageKey>& key, std::vector<PageKey>& upcoming);
+    void listUpcoming(std::vector<PageKey>& upcoming);
 
     std::vector<PageSource> sources_;
     std::mutex mutex_;
     std::condition_variable wake_;
     std::deque<PageKey> queue_;
-    std::vector<PageKey> begun_;  // until taken
+    std::vector<PageKey> begun_;   // until taken
+    std::deque<PageKey> advised_;  // that the system was told of last
     std::vector<LoadedPage> ready_;
     std::vector<std::vector<Mesh>> dropped_;
     std::atomic<uint64_t> bytes_read_{0};

@@ -55,6 +55,8 @@ public:
     uint32_t pageCount() const { return uint32_t(pages_.size()); }
     const PageInfo& page(uint32_t page) const { return pages_[page]; }
 
+    /// Tells the system that the page will be read soon.
+    void willRead(uint32_t page) const { file_.willRead(pages_[page].offset, pages_[page].bytes); }
     /// Reads a page as it lies on disk and checks its checksum.
     void readPage(uint32_t page, std::vector<std::byte>& bytes) const;
     [[nodiscard]] bool tryReadPage(uint32_t page, std::vector<std::byte>& bytes,
