@@ -231,9 +231,8 @@ void Rasteriser::State::drawChunk(const DrawChunk& chunk, const VisibilityTile& 
     prefetchBytes(patch.vertex, patch.mesh().vertexCount() * sizeof(ScreenVertex));
     const PixelBox box = chunk.box.intersected(tile.box);
     for (int32_t y = box.y0; y < box.y1; ++y)
-        prefetchBytes(
-            tile.key + (size_t(y) * size_t(tile.width) + size_t(box.x0)) * size_t(tile.samples),
-            size_t(box.x1 - box.x0) * size_t(tile.samples) * sizeof(VisibilityKey));
+        prefetchBytes(tile.key + tile.at(box.x0, y) * size_t(tile.samples),
+                      size_t(box.x1 - box.x0) * size_t(tile.samples) * sizeof(VisibilityKey));
     drawTriangles(tile,
                   {patch.triangle() + chunk.first, chunk.count, chunk.firstNumber(), patch.vertex,
                    patch.both_sides},
