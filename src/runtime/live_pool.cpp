@@ -102,7 +102,7 @@ void LivePool::load(size_t free_bytes) {
     free_bytes_ -= std::min(free_bytes_, pageBytes(begun_));
     no_room_ = false;
     for (uint32_t i = 0; i < parts_.size(); ++i)
-        want(i, parts_[i].model->requests(kMostWanted / parts_.size()), true);
+        want(i, parts_[i].model->requests(std::max<size_t>(kMostWanted / parts_.size(), 1)), true);
     for (const int which : {0, 1})
         for (uint32_t i = 0; i < parts_.size(); ++i) want(i, parts_[i].ahead[which], false);
     std::vector<std::vector<Mesh>> none;

@@ -85,6 +85,8 @@ void PagePool::loadRoots(size_t table_bytes) {
 void PagePool::publish(uint32_t frame) {
     frame_ = frame;
     wanted_.clear();
+    ram_.beginFrame();
+    device_.beginFrame();
     loader_->take(loaded_);
     for (LoadedPage& page : loaded_) keep(page);
     loaded_.clear();
@@ -104,6 +106,7 @@ void PagePool::publish(uint32_t frame) {
 
 void PagePool::keep(LoadedPage& page) {
     SceneModel& model = modelOf(page.key);
+    ram_.reserved -= model.copy_bytes[page.key.page];
     if (!page.fault.empty()) {
         model.bad[page.key.page] = 1;
         faults_.push_back(fmt::format("{}: byte {}: {}", model.reader.path(),
@@ -156,6 +159,7 @@ void PagePool::want(PageKey key, Need need) {
 void PagePool::load() {
     std::vector<PageKey> to_load;
     missing_ = 0;
+    blocked_ = false;
     const auto begun = loader_->forget();
     if (!begun) {
         for (const Wanted& wanted : wanted_) missing_ += wanted.need != Need::kLater;
@@ -198,15 +202,12 @@ void PagePool::keepWhatWaitsFor(const PageKey& key) {
 }
 
 void PagePool::reserve(std::span<const PageKey> begun) {
-    ram_.beginFrame();
-    device_.beginFrame();
     ram_.reserved = device_.reserved = 0;
     for (const PageKey& key : begun) {
         ram_.reserved += modelOf(key).copy_bytes[key.page];
         if (!modelOf(key).residency.resident(key.page))
             device_.reserved += modelOf(key).drawn_bytes[key.page];
     }
-    begun_bytes_ = ram_.reserved;
     if (sink_ != nullptr) device_.used = sink_->usedBytes();
     for (const PageKey& key : arriving_) device_.reserved += modelOf(key).drawn_bytes[key.page];
 }

@@ -58,7 +58,7 @@ public:
     size_t ramBudget() const { return ram_.budget; }
     size_t deviceBudget() const { return device_.budget; }  ///< 0: there is no sink
     /// In RAM, what is on its way included.
-    size_t ramBytes() const { return ram_.used + begun_bytes_; }
+    size_t ramBytes() const { return ram_.used + ram_.reserved; }
     size_t deviceBytes() const { return sink_ != nullptr ? sink_->usedBytes() : 0; }
     uint64_t bytesRead() const { return loader_->bytesRead(); }
     const std::vector<std::string>& faults() const { return faults_; }
@@ -88,7 +88,6 @@ private:
     SceneModels& models_;
     PageSink* const sink_;
     PageMemory ram_, device_;
-    size_t begun_bytes_ = 0;  // being loaded
     uint32_t frame_ = 0;
     std::vector<Wanted> wanted_;
     std::vector<LoadedPage> loaded_;
