@@ -17,6 +17,7 @@
 #include "methods/method_table.h"
 #include "render/offline/offline_picture.h"
 #include "render/raster/rasteriser.h"
+#include "runtime/live_settle.h"
 #include "runtime/scene.h"
 #include "store/model_reader.h"
 #include "tests/conformance/meshes.h"
@@ -232,6 +233,17 @@ TEST_P(LiveScene, sharesBudgetsAndToleranceWithPatches) {
             {frame.models[0].view, &live.info().lattice, frame.models[0].patches},
             {frame.models[1].view, &patches.info().lattice, frame.models[1].patches}};
         expectSame(draw(shown), expected);
+    }
+}
+
+TEST_P(LiveScene, chunksStaySmallWhenAllIsRefinedAtOnce) {
+    const ModelReader model(scratch_.file("bordered"));
+    const auto live = openLive(model);
+    const View view(flight(0).camera, kSize, model.info().lattice);
+    for (int i = 0; i < 12; ++i) {
+        settle(model, *live, view, i % 2 == 0 ? 1e9 : 0.02, size_t(1) << 30);
+        for (const LiveChunk& chunk : live->chunks())
+            ASSERT_LE(chunk.mesh.triangleCount(), 2048u) << i;
     }
 }
 

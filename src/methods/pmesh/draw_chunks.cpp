@@ -38,8 +38,8 @@ void DrawChunks::update(ActiveMesh& mesh) {
     for (uint32_t c = 0; c < face_.size(); ++c)
         if (touched[c] && !face_[c].empty() && face_[c].size() < kFew) given |= giveAway(mesh, c);
     if (given) list(mesh);
-    for (uint32_t c = 0; c < face_.size(); ++c)  // which cutting adds to
-        while (face_[c].size() > kMost) cut(mesh, c);
+    for (uint32_t c = 0; c < face_.size();)  // which cutting adds to, also before c
+        c = face_[c].size() > kMost ? std::min(c, cut(mesh, c)) : c + 1;
     std::vector<uint32_t> changed;
     for (uint32_t c = 0; c < touched.size(); ++c)
         if (touched[c]) changed.push_back(c);
@@ -82,8 +82,8 @@ bool DrawChunks::giveAway(ActiveMesh& mesh, uint32_t chunk) {
     return false;
 }
 
-/// Half of it goes to another one.
-void DrawChunks::cut(ActiveMesh& mesh, uint32_t chunk) {
+/// Half of it goes to another one, which is returned.
+uint32_t DrawChunks::cut(ActiveMesh& mesh, uint32_t chunk) {
     std::vector<uint32_t>& faces = face_[chunk];
     Box3i box;
     for (const uint32_t f : faces) box.add(mesh.vertex[mesh.face[f].vertex[0]].position());
@@ -112,6 +112,7 @@ void DrawChunks::cut(ActiveMesh& mesh, uint32_t chunk) {
     for (const uint32_t f : rest) mesh.face[f].left[3] = other;
     face_[other] = std::move(rest);
     mesh.chunk_touched[other] = 1;
+    return other;
 }
 
 void DrawChunks::make(const ActiveMesh& mesh, uint32_t index) {

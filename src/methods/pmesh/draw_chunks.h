@@ -25,7 +25,7 @@ public:
 
 private:
     void list(const ActiveMesh& mesh);
-    void cut(ActiveMesh& mesh, uint32_t chunk);
+    uint32_t cut(ActiveMesh& mesh, uint32_t chunk);
     bool giveAway(ActiveMesh& mesh, uint32_t chunk);
     void make(const ActiveMesh& mesh, uint32_t chunk);
 
