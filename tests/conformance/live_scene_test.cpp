@@ -349,6 +349,25 @@ TEST_P(LiveScene, damagedPagesAreToldAndDrawnCoarser) {
     EXPECT_NE(scene.faults()[0].find(path), std::string::npos);
 }
 
+TEST_P(LiveScene, pagesThatDoNotFitTheirPlaceAreTold) {
+    const ModelReader model(scratch_.file("bordered"));
+    const auto live = openLive(model);
+    const View view(flight(0).camera, kSize, model.info().lattice);
+    live->adapt({.view = &view, .pixels = 0.02, .most_bytes = size_t(1) << 30});
+    const std::vector<uint32_t> pages = live->requests(64);
+    size_t refused = 0;
+    std::vector<std::byte> bytes;
+    std::string fault;
+    for (size_t i = 1; i < pages.size(); ++i) {
+        bytes.clear();
+        model.readPage(pages[i], bytes);
+        const auto other = live->decode(pages[i], bytes, fault);
+        refused += !live->arrive(pages[i - 1], other.get());
+        EXPECT_EQ(live->faults().size(), refused);
+    }
+    EXPECT_GT(refused, 0u);
+}
+
 TEST_P(LiveScene, aBudgetBelowTheCoarsestSaysWhatIsNeeded) {
     const ModelReader model(scratch_.file("closed"));
     SceneSettings settings = ample();

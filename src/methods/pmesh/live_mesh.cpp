@@ -87,6 +87,7 @@ private:
     const Lattice& lattice() const { return nodes_.mesh().lattice; }
     size_t meshBytes() const { return adaption_.mesh().vertexCount() * kVertexBytes; }
     double largestError(const View& view) const;
+    void tell(const std::string& what);
 
     const std::vector<NodeRow> rows_;
     ResidentNodes nodes_;
@@ -99,9 +100,10 @@ private:
 };
 
 bool LiveMesh::arrive(uint32_t page, const LivePage* decoded) {
-    if (decoded) return nodes_.arrive(page, static_cast<const NodePage*>(decoded)->node);
-    nodes_.giveUp(page);
-    return true;
+    if (!decoded) return nodes_.giveUp(page), true;
+    if (nodes_.arrive(page, static_cast<const NodePage*>(decoded)->node)) return true;
+    if (nodes_.isGivenUp(page)) tell(fmt::format("page {} does not fit its parent", page));
+    return false;
 }
 
 const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
@@ -144,9 +146,14 @@ const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
     if (frame_.short_of_memory) nodes_.evictOldest();
     const bool is_done = counts.finished && !counts.short_of_room && adaption_.waiting().empty();
     frame_.largest_px = is_done ? task.pixels : largestError(*task.view);
-    if (faults_.empty() && adaption_.refused() > 0)
-        faults_.push_back(path_ + ": the model is damaged: operations do not fit their places");
+    if (adaption_.refused() > 0) tell("operations do not fit their places");
     return frame_;
+}
+
+/// Once.
+void LiveMesh::tell(const std::string& what) {
+    const std::string fault = path_ + ": the model is damaged: " + what;
+    if (std::find(faults_.begin(), faults_.end(), fault) == faults_.end()) faults_.push_back(fault);
 }
 
 /// Of what could be refined in the picture.
