@@ -32,7 +32,6 @@ public:
     /// Of model i, as chunks are now. False if not all of them are there: there is no room, and the
     /// mesh must get coarser before it is drawn.
     [[nodiscard]] bool update(uint32_t i, std::span<const LiveChunk> chunks);
-    bool holds(uint32_t i, uint32_t chunk) const { return models_[i].version[chunk] != 0; }
 
 private:
     struct Model {

@@ -63,6 +63,11 @@ public:
             throw MemoryError(
                 fmt::format("the tables and the coarsest level need {}",
                             formatBytes(table_bytes_ + pages_.ramBytes() + live_.bytes())));
+        for (uint32_t i = 0; i < live_.size(); ++i)
+            if (!uploads_.update(i, live_.model(i).chunks()))
+                throw MemoryError(
+                    fmt::format("the coarsest level needs more than {} of graphics memory",
+                                formatBytes(settings.sink->capacityBytes())));
         last_.seconds = -std::numeric_limits<double>::infinity();
     }
 
@@ -141,7 +146,9 @@ const Frame& Scene::Impl::update(const FrameRequest& request) {
     frame_.publish_ms = watch.ms();
     select(request);
     wantMissing();
-    request.prefetch ? prefetch(request) : live_.forgetPrefetch();
+    // What others let go of is for what is needed, then.
+    const bool is_short = pages_.blocked() || live_.shortOfMemory();
+    request.prefetch && !is_short ? prefetch(request) : live_.forgetPrefetch();
     pages_.setElsewhere(live_.bytes());
     pages_.load();
     live_.load(pages_.freeRam());

@@ -374,6 +374,10 @@ TEST_P(LiveScene, aBudgetBelowTheCoarsestSaysWhatIsNeeded) {
     settings.ram_bytes = tableBytes(model) + 1000;
     EXPECT_THROW(Scene({&model}, settings), MemoryError);
     EXPECT_THROW(Scene({&model}, {}), InputError);  // who should open it?
+    StrictSink sink(20);
+    settings = ample();
+    settings.sink = &sink;
+    EXPECT_THROW(Scene({&model}, settings), MemoryError);
 }
 
 }  // namespace
