@@ -19,8 +19,8 @@
 // needed and is closed under dependency: it depends on the criterion alone, not on what was before.
 //
 // Where some nodes of operations are not loaded, what they would split stays marked, and so nothing
-// around it merges; all of that is told (waiting()). To undo never takes
-// a node that is not loaded, as long as nodes with applied operations stay.
+// around it merges; all of that is told (waiting()). To undo never takes a node that is not loaded,
+// as long as nodes with applied operations stay.
 //
 // The arrays after each pass are the same for any number of threads. A frame with nothing to do
 // reads 24 bytes a vertex. Not thread-safe.

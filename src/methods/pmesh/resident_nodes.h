@@ -1,6 +1,6 @@
 #pragma once
 // The nodes of operations that are in memory at run time (Derzapf et al. 2011, section 4.1): which
-// ones are wanted, which may leave, and how much coarser everything must be so that they fit.
+// ones are wanted, and which may leave.
 //
 // A frame: Adaption::frame(), note() what it missed, then arrive() for nodes that others have read,
 // at most as many as the frame can bear, in the order of requests(). Never waits for anything.
@@ -8,12 +8,11 @@
 //   - Roots are there from the beginning and stay. So does every node with an applied operation,
 //     and with it those above: so coarsening needs no node that is not there.
 //   - Asked for is whatever the frame marked and had not: the forced closure of what the view
-//   needs,
-//     as far as it is known. What the view alone needs would not do: a vertex waits for neighbours
-//     whose splits nobody asks for.
+//     needs, as far as it is known. What the view alone needs would not do: a vertex waits for
+//     neighbours whose splits nobody asks for.
 //   - Longest asked for comes first, so every node that is asked for in each frame arrives.
-//   - There are never more than `most` nodes. Where more are required, in use or asked for, than
-//     that, a detail factor grows until they fit, and goes back only when well below: it settles.
+//   - No node arrives beyond `most`. Where more are required(), in use or asked for, than that,
+//     whoever calls has to make do with less.
 //   - A node that is damaged, or does not fit its parent, is never asked for again, nor what is
 //     below it.
 //
@@ -34,8 +33,8 @@ inline constexpr size_t kNodeBytes = kNodeSlots * (sizeof(Operation) + 4);
 
 class ResidentNodes : public References {
 public:
-    /// Of `forest`, whose nodes but the roots may be empty. CHECKs that roots fit. `most` will not
-    /// grow.
+    /// Of `forest`, whose nodes but the roots may be empty. CHECKs that roots fit. setMost() goes
+    /// no higher than `most`.
     ResidentNodes(NodeForest forest, uint32_t most);
     /// From now on; no node leaves for that.
     void setMost(size_t most) {
