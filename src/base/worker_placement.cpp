@@ -1,6 +1,7 @@
 #include "base/worker_placement.h"
 
 #include <sched.h>
+#include <tbb/task_arena.h>
 
 namespace pietra {
 namespace {
@@ -17,24 +18,16 @@ const cpu_set_t& allowedCpus() {
 
 }  // namespace
 
-WorkerPlacement::WorkerPlacement() {
-    if (CPU_COUNT(&allowedCpus()) > 1) observe(true);
-    update();
-}
-
-WorkerPlacement::~WorkerPlacement() {
-    observe(false);
-}
-
 void WorkerPlacement::update() {
-    frame_cpu_.store(::sched_getcpu(), std::memory_order_relaxed);
+    if (CPU_COUNT(&allowedCpus()) > 1)
+        frame_cpu_.store(::sched_getcpu(), std::memory_order_relaxed);
 }
 
-/// Called in the thread that enters; it can be moved by itself alone, as it may end at any time.
-void WorkerPlacement::on_scheduler_entry(bool is_worker) {
+/// A thread moves itself: another one could not know that it still lives.
+void WorkerPlacement::keepOff(int cpu) {
     thread_local int kept_off = -1;
-    const int cpu = frame_cpu_.load(std::memory_order_relaxed);
-    if (!is_worker || cpu == kept_off || cpu < 0) return;
+    const bool is_worker = tbb::this_task_arena::current_thread_index() > 0;
+    if (cpu == kept_off || !is_worker) return;
     cpu_set_t others = allowedCpus();
     CPU_CLR(cpu, &others);
     ::sched_setaffinity(0, sizeof others, &others);

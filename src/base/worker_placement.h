@@ -6,26 +6,30 @@
 // away. A frame of a few milliseconds after some idling is then over before the scheduler spreads
 // the threads, and has had one processor. So the workers are kept off the frame thread's.
 
-#include <tbb/task_scheduler_observer.h>
-
 #include <atomic>
 
 namespace pietra {
 
-/// From its making on, of the loops that the making thread runs. Workers keep the place they were
-/// given when this is gone. Does nothing where the process may use one processor only.
-class WorkerPlacement : private tbb::task_scheduler_observer {
+/// One at a time. Workers keep the place they were given when this is gone. Does nothing where the
+/// process may use one processor only.
+class WorkerPlacement {
 public:
-    WorkerPlacement();
-    ~WorkerPlacement() override;
+    WorkerPlacement() { update(); }
+    ~WorkerPlacement() { frame_cpu_.store(-1, std::memory_order_relaxed); }
+    WorkerPlacement(const WorkerPlacement&) = delete;
+    WorkerPlacement& operator=(const WorkerPlacement&) = delete;
 
     /// By the frame thread, at the beginning of each frame, for it may have been moved.
     void update();
 
-private:
-    void on_scheduler_entry(bool is_worker) override;
+    /// By the bodies of a frame's parallel loops. Costs nothing where all is in place.
+    static void enter() {
+        if (const int cpu = frame_cpu_.load(std::memory_order_relaxed); cpu >= 0) keepOff(cpu);
+    }
 
-    std::atomic<int> frame_cpu_{-1};
+private:
+    static void keepOff(int cpu);
+    static inline std::atomic<int> frame_cpu_{-1};
 };
 
 }  // namespace pietra
