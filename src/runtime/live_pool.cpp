@@ -93,6 +93,7 @@ void LivePool::want(uint32_t i, std::span<const uint32_t> pages, bool now) {
 }
 
 void LivePool::load(size_t free_bytes) {
+    no_room_ = false;
     auto begun = loader_->forget();
     if (!begun) return;
     // What was wanted and not begun gives its room back.
@@ -100,7 +101,6 @@ void LivePool::load(size_t free_bytes) {
     wanted_.clear();
     begun_ = std::move(*begun);
     free_bytes_ -= std::min(free_bytes_, pageBytes(begun_));
-    no_room_ = false;
     for (uint32_t i = 0; i < parts_.size(); ++i)
         want(i, parts_[i].model->requests(std::max<size_t>(kMostWanted / parts_.size(), 1)), true);
     for (const int which : {0, 1})
