@@ -60,7 +60,7 @@ const LiveFrame& LivePool::adapt(size_t i, LiveTask task, size_t free_bytes) {
     });
     part.frame = part.model->adapt(task);
     for (const auto faults = part.model->faults(); part.faults_told < faults.size();)
-        faults_.push_back(faults[part.faults_told++]);
+        faults_.push_back(part.reader->path() + ": " + faults[part.faults_told++]);
     return part.frame;
 }
 

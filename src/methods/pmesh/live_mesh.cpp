@@ -60,8 +60,7 @@ public:
     explicit LiveMesh(const ModelReader& reader)
         : rows_(rowsOf(reader.nodes(), reader.info().lattice.shift)),
           nodes_(openRoots(reader), uint32_t(rows_.size())),
-          adaption_(nodes_.mesh(), &nodes_),
-          path_(reader.path()) {
+          adaption_(nodes_.mesh(), &nodes_) {
         chunks_.update(adaption_.mesh());
     }
 
@@ -95,7 +94,6 @@ private:
     DrawChunks chunks_;
     double chunks_ms_ = 0;  // of the last frame
     LiveFrame frame_;
-    std::string path_;
     std::vector<std::string> faults_;
 };
 
@@ -152,7 +150,7 @@ const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
 
 /// Once.
 void LiveMesh::tell(const std::string& what) {
-    const std::string fault = path_ + ": the model is damaged: " + what;
+    const std::string fault = "the model is damaged: " + what;
     if (std::find(faults_.begin(), faults_.end(), fault) == faults_.end()) faults_.push_back(fault);
 }
 

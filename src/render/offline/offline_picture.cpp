@@ -155,6 +155,8 @@ private:
         statistics.tolerance_px =
             std::max(statistics.tolerance_px,
                      settle(*model.reader, *live, model.view, settings_.pixels, live_bytes_));
+        if (!live->faults().empty())
+            throw InputError(model.reader->path(), "", live->faults().front());
         statistics.resident_bytes =
             std::max(statistics.resident_bytes, fixed_bytes_ + live->bytes());
         statistics.load_ms += watch.ms();

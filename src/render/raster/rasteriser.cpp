@@ -300,6 +300,7 @@ void Rasteriser::State::drawTiles(const std::vector<DrawChunk>& chunks, bool lea
     std::atomic<uint64_t> covered{0};
     Stopwatch watch;
     const auto drawTile = [&](DrawTile& piece) {
+        WorkerPlacement::enter();
         Stopwatch tile_watch;
         const VisibilityTile tile = is_all ? ownTile(piece.box) : tileOfWhole(piece.box);
         if (leave_out_hidden)
