@@ -17,6 +17,7 @@
 #include "methods/pmesh/in_core_builder.h"
 #include "methods/pmesh/node_codec.h"
 #include "methods/pmesh/whole_mesh.h"
+#include "pmesh_views.h"
 
 namespace {
 
@@ -83,15 +84,6 @@ void settle(const char* what, Adaption& adaption, const Criterion& criterion) {
                 counts.operations() / seconds * 1e-6, adaption.mesh().faceCount());
 }
 
-Criterion viewFrom(const Box3d& box, const Lattice& lattice, double turn, double distance,
-                   double pixels) {
-    Camera camera;
-    const double size = glm::length(box.max - box.min);
-    camera.target = (box.min + box.max) * 0.5;
-    camera.eye = camera.target + size * distance * Vec3d(std::cos(turn), std::sin(turn), 0.3);
-    return criterionOf(View(camera, {1920, 1080}, lattice), lattice, pixels);
-}
-
 void fly(Adaption& adaption, const Box3d& box, const Lattice& lattice, int jobs) {
     double busy_seconds = 0;
     uint64_t operations = 0;
@@ -135,10 +127,7 @@ void hover(Adaption& adaption, const Box3d& box, const Lattice& lattice, int job
 /// A camera that rushes to and fro while it circles, eight frames a round: each frame until nothing
 /// is left to do.
 void storm(Adaption& adaption, const Box3d& box, const Lattice& lattice, double pixels) {
-    const auto view = [&](int frame) {
-        const double t = std::abs(frame % 8 - 4) / 4.0;
-        return viewFrom(box, lattice, 0.05 * frame, 0.4 + 1.6 * t, pixels);
-    };
+    const auto view = [&](int frame) { return stormView(box, lattice, frame, pixels); };
     adaption.settle(view(0));
     uint64_t operations = 0, passes = 0, vertices = 0;
     uint32_t least = ~0u;

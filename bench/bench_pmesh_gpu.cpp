@@ -30,6 +30,7 @@
 #include "methods/pmesh/gl/gl_adaption.h"
 #include "methods/pmesh/in_core_builder.h"
 #include "methods/pmesh/whole_mesh.h"
+#include "pmesh_views.h"
 
 namespace {
 
@@ -82,22 +83,11 @@ private:
     std::vector<std::pair<std::string, GLuint>> mark_;
 };
 
-Criterion viewFrom(const Box3d& box, const Lattice& lattice, double turn, double distance,
-                   double pixels) {
-    Camera camera;
-    const double size = glm::length(box.max - box.min);
-    camera.target = (box.min + box.max) * 0.5;
-    camera.eye = camera.target + size * distance * Vec3d(std::cos(turn), std::sin(turn), 0.3);
-    return criterionOf(View(camera, {1920, 1080}, lattice), lattice, pixels);
-}
-
 struct Scene {
     ProgressiveMesh mesh;
     Box3d box;
-    /// To and fro while it circles, eight frames a round.
     Criterion storm(int frame, double pixels) const {
-        const double t = std::abs(frame % 8 - 4) / 4.0;
-        return viewFrom(box, mesh.lattice, 0.05 * frame, 0.4 + 1.6 * t, pixels);
+        return stormView(box, mesh.lattice, frame, pixels);
     }
 };
 

@@ -1,0 +1,28 @@
+#pragma once
+// The cameras of the benchmarks of progressive meshes, as criteria for 1920x1080.
+
+#include <cmath>
+#include <cstdlib>
+
+#include "geometry/bounds.h"
+#include "methods/pmesh/criterion.h"
+
+namespace pietra::pmesh {
+
+/// Towards the middle of the box, from so many of its diagonals away.
+inline Criterion viewFrom(const Box3d& box, const Lattice& lattice, double turn, double distance,
+                          double pixels) {
+    Camera camera;
+    const double size = glm::length(box.max - box.min);
+    camera.target = (box.min + box.max) * 0.5;
+    camera.eye = camera.target + size * distance * Vec3d(std::cos(turn), std::sin(turn), 0.3);
+    return criterionOf(View(camera, {1920, 1080}, lattice), lattice, pixels);
+}
+
+/// To and fro while it circles, eight frames a round.
+inline Criterion stormView(const Box3d& box, const Lattice& lattice, int frame, double pixels) {
+    const double t = std::abs(frame % 8 - 4) / 4.0;
+    return viewFrom(box, lattice, 0.05 * frame, 0.4 + 1.6 * t, pixels);
+}
+
+}  // namespace pietra::pmesh
