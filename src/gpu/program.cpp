@@ -13,6 +13,16 @@ constexpr std::string_view kHead =
     "#version 450 core\n"
     "#extension GL_ARB_shader_draw_parameters : require\n";
 
+/// `get`: glGetShaderInfoLog or glGetProgramInfoLog.
+template <class Get>
+std::string logOf(GLuint object, const Get& get) {
+    std::string log(4096, '\0');
+    GLsizei length = 0;
+    get(object, GLsizei(log.size()), &length, log.data());
+    log.resize(size_t(length));
+    return log;
+}
+
 GlShader compile(GlTexts text_of, const GlStage& stage, std::string_view defines) {
     std::string source = fmt::format("{}{}", kHead, defines);
     std::string names;
@@ -28,13 +38,10 @@ GlShader compile(GlTexts text_of, const GlStage& stage, std::string_view defines
     glCompileShader(shader);
     GLint done = 0;
     glGetShaderiv(shader, GL_COMPILE_STATUS, &done);
-    if (done == 0) {
-        std::string log(4096, '\0');
-        GLsizei length = 0;
-        glGetShaderInfoLog(shader, GLsizei(log.size()), &length, log.data());
-        log.resize(size_t(length));
-        failCheck(__FILE__, __LINE__, fmt::format("shader{} does not compile: {}", names, log));
-    }
+    if (done == 0)
+        failCheck(
+            __FILE__, __LINE__,
+            fmt::format("shader{} does not compile: {}", names, logOf(shader, glGetShaderInfoLog)));
     return shader;
 }
 
@@ -47,13 +54,9 @@ GlProgram makeProgram(GlTexts text_of, std::initializer_list<GlStage> stages,
     glLinkProgram(program);
     GLint done = 0;
     glGetProgramiv(program, GL_LINK_STATUS, &done);
-    if (done == 0) {
-        std::string log(4096, '\0');
-        GLsizei length = 0;
-        glGetProgramInfoLog(program, GLsizei(log.size()), &length, log.data());
-        log.resize(size_t(length));
-        failCheck(__FILE__, __LINE__, fmt::format("shaders do not link: {}", log));
-    }
+    if (done == 0)
+        failCheck(__FILE__, __LINE__,
+                  fmt::format("shaders do not link: {}", logOf(program, glGetProgramInfoLog)));
     return program;
 }
 
