@@ -88,8 +88,7 @@ private:
 /// What one sample position shares: coordinates from that sample of the pixel (x0, y0) of each
 /// lane.
 struct Sampled {
-    VI x0, y0;      ///< first pixel within triangle and tile
-    VI wide, high;  ///< how many more there are
+    VI wide, high;  ///< how many pixels there are within triangle and tile, beside the first
     LaneEdge edge[3];
     VI value[3];    ///< of the edges, at the origin
     VF d0, d1, d2;  ///< depth and its differences
@@ -240,9 +239,7 @@ private:
         }
         const LaneEdge edge[3] = {
             {x[1], y[1], x[2], y[2]}, {x[2], y[2], x[0], y[0]}, {x[0], y[0], x[1], y[1]}};
-        return {x0,
-                y0,
-                wide,
+        return {wide,
                 high,
                 {edge[0], edge[1], edge[2]},
                 {edge[0].valueAtOrigin(x[1], y[1]), edge[1].valueAtOrigin(x[2], y[2]),
