@@ -7,13 +7,9 @@ namespace pietra {
 ForestRefiner::ForestRefiner(const Residency& residency)
     : residency_(residency),
       forest_(residency.forest()),
-      group_used_(forest_.groupCount(), 0),
-      group_requested_(forest_.groupCount(), 0) {
-    PageIndex pages = 0;
-    for (const Node& node : forest_.nodes()) pages = std::max(pages, node.page + 1);
-    page_used_.assign(pages, 0);
-    page_requested_.assign(pages, 0);
-}
+      group_open_(forest_.groupCount(), 0),
+      page_used_(residency.pageCount(), 0),
+      page_requested_(residency.pageCount(), 0) {}
 
 void ForestRefiner::select(const View& view, double pixels, const Culling& culling,
                            Selection& selection) {
@@ -31,47 +27,49 @@ void ForestRefiner::select(const View& view, double pixels, const Culling& culli
             if (!forest_.node(i).isLeaf())
                 selection.largest_px = std::max(selection.largest_px, error);
         },
-        [&](uint32_t group) { use(group); });
+        [&](NodeIndex i) { page_used_[forest_.node(i).page] = selects_; });
     std::sort(selection.draw.begin(), selection.draw.end());
-    requestMissing(selection.requests);
+    listMissing(selection.requests);
 }
 
 void ForestRefiner::prefetch(const View& view, double pixels, const Culling& culling,
                              std::vector<PageRequest>& requests) {
     visit(
-        view, pixels, culling, Missed::kFirst, [](NodeIndex, double) {}, [](uint32_t) {});
-    requestMissing(requests);
+        view, pixels, culling, Missed::kFirst, [](NodeIndex, double) {}, [](NodeIndex) {});
+    listMissing(requests);
 }
 
-/// Largest error first, so that a page stands where the first group that needs it does.
-void ForestRefiner::requestMissing(std::vector<PageRequest>& requests) {
-    std::sort(missing_.begin(), missing_.end(), [](const Missing& a, const Missing& b) {
-        return a.pixels != b.pixels ? a.pixels > b.pixels : a.group < b.group;
+/// Largest error first, so that a page stands where the first node that needs it does.
+void ForestRefiner::listMissing(std::vector<PageRequest>& requests) {
+    std::sort(missing_.begin(), missing_.end(), [](const PageRequest& a, const PageRequest& b) {
+        return a.pixels != b.pixels ? a.pixels > b.pixels : a.page < b.page;
     });
-    for (const Missing& m : missing_) request(m.group, m.pixels, requests);
+    for (const PageRequest& request : missing_) {
+        if (page_requested_[request.page] == round_) continue;
+        page_requested_[request.page] = round_;
+        requests.push_back(request);
+    }
 }
 
-/// What keeps the group open: the pages of its children, and of those of all groups above it.
-void ForestRefiner::use(uint32_t group) {
-    if (group_used_[group] == selects_) return;
-    group_used_[group] = selects_;
-    for (const PageIndex page : residency_.childPages(group)) page_used_[page] = selects_;
-    for (const uint32_t parent : residency_.parentGroups(group)) use(parent);
+bool ForestRefiner::open(uint32_t group, const Sight& sight) {
+    if (group_open_[group] >> 1 == visits_) return group_open_[group] & 1;
+    bool is_open = residency_.childrenResident(group) || seenChildrenResident(group, sight);
+    for (const NodeIndex i : forest_.members(group)) {
+        if (!is_open) break;
+        const NodeIndex parent = forest_.parent(i);
+        if (parent != kNoNode) is_open = open(forest_.groupOf(parent), sight);
+    }
+    group_open_[group] = visits_ << 1 | uint32_t(is_open);
+    return is_open;
 }
 
-/// What is missing for the group to open, from above down.
-void ForestRefiner::request(uint32_t group, float pixels, std::vector<PageRequest>& requests) {
-    if (group_requested_[group] == round_ || residency_.open(group)) return;
-    group_requested_[group] = round_;
-    for (const uint32_t parent : residency_.parentGroups(group)) request(parent, pixels, requests);
-    for (const PageIndex page : residency_.childPages(group)) requestPage(page, pixels, requests);
-}
-
-void ForestRefiner::requestPage(PageIndex page, float pixels, std::vector<PageRequest>& requests) {
-    if (page_requested_[page] == round_ || residency_.resident(page)) return;
-    page_requested_[page] = round_;
-    for (const PageIndex above : residency_.pagesAbove(page)) requestPage(above, pixels, requests);
-    requests.push_back({page, pixels});
+bool ForestRefiner::seenChildrenResident(uint32_t group, const Sight& sight) const {
+    for (const NodeIndex i : forest_.members(group))
+        for (const NodeIndex child : forest_.node(i).child)
+            if (child != kNoNode && !residency_.resident(forest_.node(child).page) &&
+                !patchInvisible(forest_.node(child), sight.view, sight.pixels, sight.culling))
+                return false;
+    return true;
 }
 
 }  // namespace pietra

@@ -2,6 +2,12 @@
 // One view on one model whose refinement is by groups of nodes: what of it to draw in this frame
 // with what is resident, and which pages would make it finer, in the order of need (Cignoni et al.
 // 2004, section 4). Neither waits nor touches a file.
+//
+// In a view, a group of nodes is *open*, it may be refined, when the pages of those of its
+// children that may be seen are resident, and the groups of its own nodes' parents are open. What
+// is drawn is what may be seen of the cut that refines all open groups that the view asks to
+// refine: a valid cut of the model, whatever is resident, as long as the roots are. What cannot be
+// seen needs no page.
 
 #include <span>
 #include <vector>
@@ -18,7 +24,7 @@ struct PageRequest {
 
 struct Selection {
     std::vector<NodeIndex> draw;
-    /// Pages that are missing, each once, largest error first, none before those it depends on.
+    /// Pages that are missing, each once, largest error first.
     std::vector<PageRequest> requests;
     /// Largest error on screen of what is drawn, in pixels; infinite where the eye is inside a
     /// sphere that could not be refined.
@@ -31,7 +37,7 @@ public:
     explicit ForestRefiner(const Residency& residency);
 
     /// Overwrites `selection`. All roots must be resident. Every node drawn that is not culled
-    /// shows at most `pixels` of error, or waits for the pages requested. Linear in the groups
+    /// shows at most `pixels` of error, or waits for the pages requested. Linear in the nodes
     /// visited.
     void select(const View& view, double pixels, const Culling& culling, Selection& selection);
     /// Appends what another view would request first and select() has not: after it, in the same
@@ -40,73 +46,85 @@ public:
                   std::vector<PageRequest>& requests);
 
     /// visit(node) for each node of the cut that nothing is culled from, as far as it is resident.
+    /// Appends to `requests` what is missing for it.
     template <class Visit>
-    void visitDrawable(const View& view, double pixels, const Visit& visit_node) {
+    void visitDrawable(const View& view, double pixels, const Visit& visit_node,
+                       std::vector<PageRequest>& requests) {
         visit(
-            view, pixels, {}, Missed::kFirst, [&](NodeIndex i, double) { visit_node(i); },
-            [](uint32_t) {});
+            view, pixels, {}, Missed::kAll, [&](NodeIndex i, double) { visit_node(i); },
+            [](NodeIndex) {});
+        ++round_;
+        listMissing(requests);
     }
 
-    /// The last select() could not have drawn what it did without this page.
+    /// The last select() drew some of the page, or looked at it on its way to what it drew or would
+    /// draw if that were resident. What is not used may leave, and it draws the same.
     bool used(PageIndex page) const { return page_used_[page] == selects_; }
 
 private:
-    /// A group that should be refined and is not open.
-    struct Missing {
-        uint32_t group;
-        float pixels;
-    };
-
     /// Of what is missing: all levels of it, or the first one.
     enum class Missed { kAll, kFirst };
 
-    template <class Draw, class Refined>
+    template <class Draw, class Look>
     void visit(const View& view, double pixels, const Culling& culling, Missed missed,
-               const Draw& draw, const Refined& refined);
-    void requestMissing(std::vector<PageRequest>& requests);
-    void use(uint32_t group);
-    void request(uint32_t group, float pixels, std::vector<PageRequest>& requests);
-    void requestPage(PageIndex page, float pixels, std::vector<PageRequest>& requests);
+               const Draw& draw, const Look& look);
+    struct Sight {
+        const View& view;
+        double pixels;
+        const Culling& culling;
+    };
+    bool open(uint32_t group, const Sight& sight);
+    /// Whatever arrives below it may never be drawn.
+    bool isLost(NodeIndex i) const {
+        const NodeIndex parent = forest_.parent(i);
+        return parent != kNoNode && residency_.childrenLost(forest_.groupOf(parent));
+    }
+    bool seenChildrenResident(uint32_t group, const Sight& sight) const;
+    void listMissing(std::vector<PageRequest>& requests);
 
     const Residency& residency_;
     const Forest& forest_;
     struct Visited {
         NodeIndex node;
         bool covered;  // a node above it is drawn, as its group is not open
+        float error_above;
     };
     std::vector<Visited> level_, next_level_;
-    std::vector<Missing> missing_;
-    std::vector<uint32_t> group_used_, page_used_;            // by which select() last
-    std::vector<uint32_t> group_requested_, page_requested_;  // in which round last
-    uint32_t selects_ = 0, round_ = 0;
+    std::vector<PageRequest> missing_;
+    std::vector<uint32_t> group_open_;                  // 2 visits_, and one more if it is open
+    std::vector<uint32_t> page_used_, page_requested_;  // by which select(), in which round, last
+    uint32_t visits_ = 0, selects_ = 0, round_ = 0;
 };
 
-/// Top-down over what may be visible: draw(node, pixels of error), refined(group) for those that
-/// are refined. Those that should be go to `missing_`, and likewise what should be below them, if
-/// all levels that are missing are to be asked for at once. Level by level, so that nodes are on
-/// their way to the cache long before they are looked at.
-template <class Draw, class Refined>
+/// Top-down over what may be visible: look(node), and draw(node, pixels of error) for what is to be
+/// drawn. What is missing goes to `missing_`. Level by level, so that nodes are on their way to the
+/// cache long before they are looked at.
+template <class Draw, class Look>
 void ForestRefiner::visit(const View& view, double pixels, const Culling& culling, Missed missed,
-                          const Draw& draw, const Refined& refined) {
+                          const Draw& draw, const Look& look) {
+    const Sight sight{view, pixels, culling};
+    ++visits_;
     missing_.clear();
     next_level_.clear();
-    for (const NodeIndex root : forest_.roots()) next_level_.push_back({root, false});
+    for (const NodeIndex root : forest_.roots()) next_level_.push_back({root, false, 0});
     while (!next_level_.empty()) {
         level_.swap(next_level_);
         next_level_.clear();
-        for (const auto [i, covered] : level_) {
+        for (const auto [i, covered, error_above] : level_) {
             const Node& node = forest_.node(i);
             if (branchInvisible(node, view, pixels, culling)) continue;
+            look(i);
+            if (!residency_.resident(node.page) && !patchInvisible(node, view, pixels, culling))
+                missing_.push_back({node.page, error_above});
             const double error = view.errorInPixels(node.error, node.saturated);
             const bool refine = !node.isLeaf() && !(error <= pixels);
-            const bool open = refine && residency_.open(forest_.groupOf(i));
-            if (open) refined(forest_.groupOf(i));
-            if (refine && !open) missing_.push_back({forest_.groupOf(i), float(error)});
-            if (!open && !covered && !patchInvisible(node, view, pixels, culling)) draw(i, error);
-            if (!refine || (!open && missed == Missed::kFirst)) continue;
+            const bool is_open = refine && !covered && open(forest_.groupOf(i), sight);
+            if (!is_open && !covered && !patchInvisible(node, view, pixels, culling))
+                draw(i, error);
+            if (!refine || (covered && (missed == Missed::kFirst || isLost(i)))) continue;
             for (const NodeIndex child : node.child)
                 if (child != kNoNode) {
-                    next_level_.push_back({child, !open});
+                    next_level_.push_back({child, !is_open, float(error)});
                     forest_.prefetch(child);
                 }
         }

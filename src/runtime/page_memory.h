@@ -35,22 +35,17 @@ public:
     void beginFrame() { victims_.reset(); }
 
     /// Evicts until so many bytes fit, or nothing more may leave; true if they fit. `candidates()`
-    /// lists what may leave, asked for once a frame; evict(key) is false where it may not yet,
-    /// because others must leave before it.
+    /// lists what may leave, asked for once a frame.
     template <class Candidates, class Evict>
     bool makeRoom(size_t bytes, Need need, uint32_t frame, const Candidates& candidates,
                   const Evict& evict);
 
 private:
-    /// Of two, the one to stay longer.
+    /// Of two, the one to stay longer: of equals the coarser one.
     static bool staysLonger(const Victim& a, const Victim& b) {
         return a.last_used != b.last_used   ? a.last_used > b.last_used
                : a.key.model != b.key.model ? a.key.model > b.key.model
-                                            : a.key.page > b.key.page;
-    }
-    void push(const Victim& victim) {
-        victims_->push_back(victim);
-        std::push_heap(victims_->begin(), victims_->end(), staysLonger);
+                                            : a.key.page < b.key.page;
     }
     Victim pop() {
         std::pop_heap(victims_->begin(), victims_->end(), staysLonger);
@@ -60,7 +55,6 @@ private:
     }
 
     std::optional<std::vector<Victim>> victims_;  // a heap: those to leave first on top
-    std::vector<Victim> waiting_;                 // may not leave before others
 };
 
 template <class Candidates, class Evict>
@@ -71,20 +65,11 @@ bool PageMemory::makeRoom(size_t bytes, Need need, uint32_t frame, const Candida
         victims_ = candidates();
         std::make_heap(victims_->begin(), victims_->end(), staysLonger);
     }
-    for (bool again = true; again && !fits(bytes);) {
-        again = false;
-        while (!victims_->empty() && !fits(bytes)) {
-            const Victim victim = pop();
-            const bool too_soon = need != Need::kDraw && victim.last_used + kFramesKept > frame;
-            if (!too_soon && evict(victim.key)) {
-                again = true;
-                continue;
-            }
-            waiting_.push_back(victim);
-            if (too_soon) break;
-        }
-        for (const Victim& victim : waiting_) push(victim);
-        waiting_.clear();
+    while (!fits(bytes) && !victims_->empty()) {
+        const bool too_soon =
+            need != Need::kDraw && victims_->front().last_used + kFramesKept > frame;
+        if (too_soon) break;
+        evict(pop().key);
     }
     return fits(bytes);
 }

@@ -92,15 +92,11 @@ void PagePool::publish(uint32_t frame) {
     loaded_.clear();
     const size_t scattered_before = scattered_bytes_;
     size_t upload_left = kUploadBytes;
-    for (size_t i = 0; i < arriving_.size();) {
-        if (!tryArrive(arriving_[i], upload_left)) {
-            ++i;
-            continue;
-        }
-        modelOf(arriving_[i]).arriving[arriving_[i].page] = 0;
-        arriving_.erase(arriving_.begin() + ptrdiff_t(i));
-        i = 0;  // others may have waited for it
-    }
+    std::erase_if(arriving_, [&](const PageKey& key) {
+        if (!tryArrive(key, upload_left)) return false;
+        modelOf(key).arriving[key.page] = 0;
+        return true;
+    });
     if (scattered_bytes_ == scattered_before) scattered_bytes_ = 0;
 }
 
@@ -109,6 +105,7 @@ void PagePool::keep(LoadedPage& page) {
     ram_.reserved -= model.copy_bytes[page.key.page];
     if (!page.fault.empty()) {
         model.bad[page.key.page] = 1;
+        model.residency.lose(page.key.page);
         faults_.push_back(fmt::format("{}: byte {}: {}", model.reader.path(),
                                       model.reader.page(page.key.page).offset, page.fault));
         return;
@@ -122,7 +119,6 @@ void PagePool::keep(LoadedPage& page) {
 
 bool PagePool::tryArrive(const PageKey& key, size_t& upload_left) {
     const SceneModel& model = modelOf(key);
-    if (!model.residency.mayArrive(key.page)) return false;
     if (sink_ == nullptr) return enter(key);
     const size_t bytes = model.copy_bytes[key.page];
     if (bytes > upload_left && upload_left < kUploadBytes) return false;
@@ -151,7 +147,7 @@ bool PagePool::enter(const PageKey& key) {
 
 void PagePool::want(PageKey key, Need need) {
     SceneModel& model = modelOf(key);
-    if (model.last_wanted[key.page] == frame_ || model.hopeless(key.page)) return;
+    if (model.last_wanted[key.page] == frame_ || model.bad[key.page] != 0) return;
     model.last_wanted[key.page] = frame_;
     wanted_.push_back({key, need});
 }
@@ -167,11 +163,9 @@ void PagePool::load() {
     }
     forgetUnwanted();
     reserve(*begun);
-    for (const PageKey& key : arriving_) keepWhatWaitsFor(key);
     blocked_ = scattered_bytes_ > 0 && !makeRoomToDraw(scattered_bytes_, Need::kDraw);
     for (const Wanted& wanted : wanted_) {
         missing_ += wanted.need != Need::kLater;
-        if (wanted.need == Need::kDraw) keepWhatWaitsFor(wanted.key);
         if (modelOf(wanted.key).arriving[wanted.key.page] != 0 ||
             std::find(begun->begin(), begun->end(), wanted.key) != begun->end())
             continue;
@@ -189,16 +183,6 @@ void PagePool::forgetUnwanted() {
         if (sink_ == nullptr) dropCopy(key);
         return true;
     });
-}
-
-/// Else two pages that only together let a group be refined may drive each other out for ever.
-void PagePool::keepWhatWaitsFor(const PageKey& key) {
-    SceneModel& model = modelOf(key);
-    for (const PageIndex above : model.residency.pagesAbove(key.page))
-        model.last_used[above] = frame_;
-    for (const uint32_t group : model.residency.groupsAbove(key.page))
-        for (const PageIndex sibling : model.residency.childPages(group))
-            model.last_used[sibling] = frame_;
 }
 
 void PagePool::reserve(std::span<const PageKey> begun) {
@@ -260,14 +244,14 @@ bool PagePool::makeRoomInRam(size_t bytes, Need need) {
     if (sink_ == nullptr) return makeRoomToDraw(bytes, need);
     return ram_.makeRoom(
         bytes, need, frame_, [&] { return copiesToDrop(); },
-        [&](const PageKey& key) { return dropCopy(key); });
+        [&](const PageKey& key) { dropCopy(key); });
 }
 
 bool PagePool::makeRoomToDraw(size_t bytes, Need need) {
     return (sink_ != nullptr ? device_ : ram_)
         .makeRoom(
             bytes, need, frame_, [&] { return pagesToLeave(); },
-            [&](const PageKey& key) { return leave(key); });
+            [&](const PageKey& key) { leave(key); });
 }
 
 /// All but those that tell where the eye is: if these left for what is drawn, the eye would count
@@ -288,27 +272,23 @@ std::vector<PageMemory::Victim> PagePool::pagesToLeave() const {
     std::vector<PageMemory::Victim> victims;
     for (uint32_t m = 0; m < models_.size(); ++m)
         for (PageIndex page = 0; page < models_[m]->bad.size(); ++page)
-            if (models_[m]->residency.resident(page) && models_[m]->last_used[page] != frame_)
+            if (models_[m]->residency.resident(page) && !models_[m]->usedIn(frame_, page))
                 victims.push_back({{m, page}, models_[m]->last_used[page]});
     return victims;
 }
 
-bool PagePool::leave(const PageKey& key) {
-    SceneModel& model = modelOf(key);
-    if (!model.residency.mayLeave(key.page) || model.last_used[key.page] == frame_) return false;
-    model.residency.leave(key.page);
+void PagePool::leave(const PageKey& key) {
+    modelOf(key).residency.leave(key.page);
     if (sink_ == nullptr) return dropCopy(key);
     sink_->release(key);
     device_.used = sink_->usedBytes();
-    return true;
 }
 
-bool PagePool::dropCopy(const PageKey& key) {
+void PagePool::dropCopy(const PageKey& key) {
     SceneModel& model = modelOf(key);
-    if (model.arriving[key.page] != 0) return false;
+    if (model.arriving[key.page] != 0) return;
     dropped_.push_back(std::exchange(model.copies[key.page], {}));
     ram_.used -= model.copy_bytes[key.page];
-    return true;
 }
 
 }  // namespace pietra

@@ -34,7 +34,7 @@ public:
     PagePool(const PagePool&) = delete;
     PagePool& operator=(const PagePool&) = delete;
 
-    /// Begins a frame: what is ready becomes resident, after what it depends on.
+    /// Begins a frame: what is ready becomes resident.
     void publish(uint32_t frame);
     /// In the order of need; what is to be drawn first.
     void want(PageKey key, Need need);
@@ -75,15 +75,14 @@ private:
     bool tryArrive(const PageKey& key, size_t& upload_left);
     bool enter(const PageKey& key);
     void forgetUnwanted();
-    void keepWhatWaitsFor(const PageKey& key);
     void reserve(std::span<const PageKey> begun);
     bool provide(const Wanted& wanted, std::vector<PageKey>& to_load);
     bool makeRoomInRam(size_t bytes, Need need);
     bool makeRoomToDraw(size_t bytes, Need need);
     std::vector<PageMemory::Victim> copiesToDrop() const;
     std::vector<PageMemory::Victim> pagesToLeave() const;
-    bool leave(const PageKey& key);
-    bool dropCopy(const PageKey& key);
+    void leave(const PageKey& key);
+    void dropCopy(const PageKey& key);
 
     SceneModels& models_;
     PageSink* const sink_;

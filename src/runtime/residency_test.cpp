@@ -33,40 +33,68 @@ struct PagedTerrain {
     }
 };
 
+constexpr Culling kNothing{}, kAll{true, true, true};
+
 /// By the definition, from nothing but which pages are resident.
-bool openByDefinition(const Forest& forest, const Residency& residency, uint32_t group) {
+bool openByDefinition(const Residency& residency, uint32_t group, const View& view, double pixels,
+                      const Culling& culling) {
+    const Forest& forest = residency.forest();
     for (const NodeIndex i : forest.members(group)) {
         if (forest.node(i).isLeaf()) return false;
         for (const NodeIndex child : forest.node(i).child)
-            if (child != kNoNode && !residency.resident(forest.node(child).page)) return false;
+            if (child != kNoNode && !residency.resident(forest.node(child).page) &&
+                !patchInvisible(forest.node(child), view, pixels, culling))
+                return false;
         const NodeIndex parent = forest.parent(i);
-        if (parent != kNoNode && !openByDefinition(forest, residency, forest.groupOf(parent)))
+        if (parent != kNoNode &&
+            !openByDefinition(residency, forest.groupOf(parent), view, pixels, culling))
             return false;
     }
     return true;
 }
 
+/// The valid cut of which a frame draws what can be seen.
+std::vector<NodeIndex> wholeCut(const Residency& residency, const View& view, double pixels,
+                                const Culling& culling) {
+    const Forest& forest = residency.forest();
+    std::vector<NodeIndex> stack = forest.roots(), cut;
+    while (!stack.empty()) {
+        const NodeIndex i = stack.back();
+        stack.pop_back();
+        const Node& node = forest.node(i);
+        if (!(view.errorInPixels(node.error, node.saturated) > pixels) ||
+            !openByDefinition(residency, forest.groupOf(i), view, pixels, culling)) {
+            cut.push_back(i);
+            continue;
+        }
+        for (const NodeIndex child : node.child)
+            if (child != kNoNode) stack.push_back(child);
+    }
+    std::sort(cut.begin(), cut.end());
+    return cut;
+}
+
 class Dweller {
 public:
-    Dweller(Residency& residency, uint32_t pages, unsigned seed)
-        : residency_(residency), pages_(pages), random_(seed) {}
+    Dweller(Residency& residency, unsigned seed) : residency_(residency), random_(seed) {}
 
-    /// Something that may arrive arrives, or something that may leave leaves.
+    /// A page arrives or leaves, rather a coarse one or a fine one; but roots stay.
     void step(double chance_to_arrive) {
         const bool arrive = std::uniform_real_distribution<>(0, 1)(random_) < chance_to_arrive;
         std::vector<PageIndex> possible;
-        for (PageIndex page = 0; page < pages_; ++page)
-            if (arrive ? !residency_.resident(page) && residency_.mayArrive(page)
-                       : residency_.resident(page) && residency_.mayLeave(page))
-                possible.push_back(page);
+        for (PageIndex page = 0; page < residency_.pageCount(); ++page)
+            if (residency_.resident(page) != arrive) possible.push_back(page);
         if (possible.empty()) return;
-        const PageIndex page = possible[random_() % possible.size()];
+        const size_t a = random_() % possible.size(), b = random_() % possible.size();
+        const PageIndex page = possible[arrive ? std::min(a, b) : std::max(a, b)];
         arrive ? residency_.arrive(page) : residency_.leave(page);
+        for (const NodeIndex root : residency_.forest().roots())
+            if (const PageIndex p = residency_.forest().node(root).page; !residency_.resident(p))
+                residency_.arrive(p);
     }
 
 private:
     Residency& residency_;
-    uint32_t pages_;
     std::mt19937 random_;
 };
 
@@ -74,21 +102,6 @@ void arriveRoots(Residency& residency) {
     for (const NodeIndex root : residency.forest().roots())
         if (const PageIndex page = residency.forest().node(root).page; !residency.resident(page))
             residency.arrive(page);
-}
-
-TEST(Residency, openIsWhatTheDefinitionSays) {
-    for (unsigned seed = 0; seed < 6; ++seed) {
-        const PagedTerrain terrain(seed);
-        const Forest forest(terrain.nodes);
-        Residency residency(forest, terrain.pages);
-        Dweller dweller(residency, terrain.pages, seed);
-        for (int step = 0; step < 300; ++step) {
-            dweller.step(step < 150 ? 0.8 : 0.4);
-            if (step % 10 != 0) continue;
-            for (uint32_t group = 0; group < forest.groupCount(); ++group)
-                ASSERT_EQ(residency.open(group), openByDefinition(forest, residency, group));
-        }
-    }
 }
 
 Camera cameraAt(std::mt19937& random) {
@@ -99,29 +112,43 @@ Camera cameraAt(std::mt19937& random) {
     return camera;
 }
 
-TEST(Residency, everyFrameIsAValidCutWhateverHasArrived) {
-    size_t finest = 0, coarsest = ~size_t(0);
+TEST(ForestRefiner, everyFrameIsWhatCanBeSeenOfAValidCutWhateverHasArrived) {
+    size_t finest = 0, coarsest = ~size_t(0), unseen_missing = 0;
+    constexpr double kPixels = 0.5;
     for (unsigned seed = 0; seed < 6; ++seed) {
         const PagedTerrain terrain(seed);
         const Forest forest(terrain.nodes);
         Residency residency(forest, terrain.pages);
         arriveRoots(residency);
         ForestRefiner refiner(residency);
-        Dweller dweller(residency, terrain.pages, seed);
+        Dweller dweller(residency, seed);
         std::mt19937 random(seed);
         Selection selection;
         for (int step = 0; step < 400; ++step) {
-            dweller.step(step % 100 < 60 ? 0.9 : 0.1);
-            arriveRoots(residency);
-            refiner.select(View(cameraAt(random), {640, 480}, Lattice{}), 0.5, {}, selection);
-            ASSERT_EQ(validateCut(terrain.nodes, selection.draw), "");
-            finest = std::max(finest, selection.draw.size());
-            coarsest = std::min(coarsest, selection.draw.size());
+            dweller.step(step % 100 < 60 ? 0.95 : 0.05);
+            const View view(cameraAt(random), {640, 480}, Lattice{});
+            const Culling& culling = step % 2 != 0 ? kAll : kNothing;
+            refiner.select(view, kPixels, culling, selection);
+            const std::vector<NodeIndex> whole = wholeCut(residency, view, kPixels, culling);
+            ASSERT_EQ(validateCut(terrain.nodes, whole), "");
+            std::vector<NodeIndex> seen;
+            for (const NodeIndex i : whole)
+                if (!patchInvisible(terrain.nodes[i], view, kPixels, culling))
+                    seen.push_back(i);
+                else
+                    unseen_missing += !residency.resident(terrain.nodes[i].page);
+            ASSERT_EQ(selection.draw, seen);
+            for (const NodeIndex i : seen) ASSERT_TRUE(residency.resident(terrain.nodes[i].page));
+            if (step % 2 == 0) {
+                finest = std::max(finest, seen.size());
+                coarsest = std::min(coarsest, seen.size());
+            }
             for (const PageRequest& request : selection.requests)
                 ASSERT_FALSE(residency.resident(request.page));
         }
     }
     EXPECT_GT(finest, 10 * coarsest);
+    EXPECT_GT(unseen_missing, 0u);
 }
 
 // Negative control: without the groups above, cuts are not valid.
@@ -163,7 +190,7 @@ TEST(ForestRefiner, whatItRequestsAtOnceLeadsToTheOfflineCut) {
     Selection selection;
     for (int i = 0; i < 20; ++i) {
         const View view(cameraAt(random), {640, 480}, Lattice{});
-        const Culling culling{true, true, true};
+        const Culling& culling = kAll;
         refiner.select(view, 0.3, culling, selection);
         for (const PageRequest& request : selection.requests) residency.arrive(request.page);
         refiner.select(view, 0.3, culling, selection);
@@ -171,14 +198,8 @@ TEST(ForestRefiner, whatItRequestsAtOnceLeadsToTheOfflineCut) {
         EXPECT_EQ(selection.draw, visibleCut(terrain.nodes, view, 0.3, culling).nodes);
         // What is not used may go, and nothing changes.
         const std::vector<NodeIndex> before = selection.draw;
-        for (bool again = true; again;) {
-            again = false;
-            for (PageIndex page = 0; page < terrain.pages; ++page)
-                if (residency.resident(page) && residency.mayLeave(page) && !refiner.used(page)) {
-                    residency.leave(page);
-                    again = true;
-                }
-        }
+        for (PageIndex page = 0; page < terrain.pages; ++page)
+            if (residency.resident(page) && !refiner.used(page)) residency.leave(page);
         refiner.select(view, 0.3, culling, selection);
         EXPECT_EQ(selection.draw, before);
         EXPECT_TRUE(selection.requests.empty());

@@ -42,7 +42,7 @@ std::vector<const ModelReader*> thoseThat(const std::vector<const ModelReader*>&
 }  // namespace
 
 size_t tableBytes(const ModelReader& model) {
-    constexpr size_t kBesideNode = 48;  // forest.h, residency.h, forest_refiner.h
+    constexpr size_t kBesideNode = 32;  // forest.h, residency.h, forest_refiner.h
     return model.nodes().size() * (sizeof(Node) + kBesideNode);
 }
 
@@ -212,11 +212,11 @@ void Scene::Impl::select(uint32_t m, const FrameRequest& request, ModelFrame& ou
     Culling culling = request.culling;
     culling.cone &= !out.two_sided;
     model.refiner.select(out.view, request.pixels * tolerance_.factor(), culling, out.selection);
-    for (PageIndex page = 0; page < model.last_used.size(); ++page)
-        if (model.refiner.used(page)) {
-            model.last_used[page] = frame_number_;
+    for (PageIndex page = 0; page < model.last_used.size(); ++page) {
+        if (model.refiner.used(page)) model.last_used[page] = frame_number_;
+        if (model.residency.resident(page) && model.usedIn(frame_number_, page))
             used_bytes_ += model.drawn_bytes[page];
-        }
+    }
     for (const PageRequest& r : out.selection.requests) missing_.push_back({{m, r.page}, r.pixels});
     describe(model, m, request.show_error, out);
     frame_.tolerance_px = std::max(frame_.tolerance_px, out.selection.largest_px);
@@ -309,27 +309,36 @@ bool Scene::Impl::mayBeInside(uint32_t m, const View& view) {
     // What is drawn is no coarser than what decided the matter, as long as that is all there.
     if (model.side && model.side->decides(view.eye()) &&
         std::all_of(model.side_pages.begin(), model.side_pages.end(),
-                    [&](PageIndex page) { return model.residency.resident(page); }))
+                    [&](PageIndex page) { return model.residency.resident(page); })) {
+        for (const PageIndex page : model.side_pages) model.eye_used[page] = frame_number_;
         return model.side->mayBeInside();
+    }
     model.side.reset();
     cut_for_eye_.clear();
     pages_for_eye_.clear();
-    model.refiner.visitDrawable(view, kEyeSidePixels, [&](NodeIndex i) {
-        cut_for_eye_.push_back(i);
-        pages_for_eye_.push_back(model.forest.node(i).page);
-    });
+    requests_.clear();
+    model.refiner.visitDrawable(
+        view, kEyeSidePixels,
+        [&](NodeIndex i) {
+            cut_for_eye_.push_back(i);
+            pages_for_eye_.push_back(model.forest.node(i).page);
+        },
+        requests_);
+    for (const PageRequest& r : requests_) missing_for_eye_.push_back({m, r.page});
     std::sort(pages_for_eye_.begin(), pages_for_eye_.end());
     pages_for_eye_.erase(std::unique(pages_for_eye_.begin(), pages_for_eye_.end()),
                          pages_for_eye_.end());
     size_t bytes = 0;
     for (const PageIndex page : pages_for_eye_) bytes += model.copy_bytes[page];
     if (!pages_.mayStay(bytes)) return true;
-    const size_t missing_before = missing_for_eye_.size();
+    bool all_copied = true;
     for (const PageIndex page : pages_for_eye_) {
         model.eye_used[page] = frame_number_;
-        if (!model.hasCopy(page)) missing_for_eye_.push_back({m, page});
+        if (model.hasCopy(page)) continue;
+        missing_for_eye_.push_back({m, page});
+        all_copied = false;
     }
-    if (missing_for_eye_.size() > missing_before) return true;
+    if (!all_copied) return true;
     constexpr size_t kSlice = 16;
     const size_t count = cut_for_eye_.size();
     std::vector<EyeSide> parts((count + kSlice - 1) / kSlice, EyeSide(view.eye()));

@@ -1,7 +1,7 @@
 #pragma once
 // Models that are looked at: which of their pages are in memory, and what to draw in a frame. The
 // frame thread calls update() and draws; it never waits for a file. Whatever has been loaded, every
-// frame is a valid, crack-free cut of each model (residency.h), or one mesh that is adapted
+// frame is a valid, crack-free cut of each model (forest_refiner.h), or one mesh that is adapted
 // (live_model.h): models of both kinds may share a scene.
 //
 // All models share the budgets: of decoded pages in RAM and, where a renderer draws from memory of

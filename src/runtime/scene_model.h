@@ -1,7 +1,6 @@
 #pragma once
 // A model of a scene: its table, and what of its pages is where.
 
-#include <algorithm>
 #include <optional>
 #include <span>
 #include <vector>
@@ -23,15 +22,9 @@ struct SceneModel {
         return hasCopy(node.page) ? &copies[node.page][node.patch] : nullptr;
     }
     bool hasCopy(PageIndex page) const { return !copies[page].empty(); }
-    /// It cannot be read, or depends on a page that cannot. To be asked of those above it first.
-    bool hopeless(PageIndex page) {
-        const std::span<const PageIndex> above = residency.pagesAbove(page);
-        if (std::any_of(above.begin(), above.end(),
-                        [&](PageIndex p) { return bad[p] != 0 && !residency.resident(p); }))
-            bad[page] = 1;
-        return bad[page] != 0;
+    bool usedIn(uint32_t frame, PageIndex page) const {
+        return last_used[page] == frame || eye_used[page] == frame;
     }
-
     const ModelReader& reader;
     Forest forest;
     Residency residency;  ///< of what may be drawn
@@ -43,11 +36,11 @@ struct SceneModel {
     std::vector<size_t> copy_bytes;         ///< of its meshes in RAM
     std::vector<size_t> drawn_bytes;        ///< where it is drawn from; about, until it was there
     std::vector<std::vector<Mesh>> copies;  ///< in RAM, or none
-    std::vector<uint32_t> last_used;        ///< in which frame it was drawn
+    std::vector<uint32_t> last_used;        ///< in which frame what is drawn needed it
     std::vector<uint32_t> eye_used;         ///< ... told where the eye is
     std::vector<uint32_t> last_wanted;      ///< ... was missing
     std::vector<uint8_t> arriving;          ///< has a copy, and waits to be resident
-    std::vector<uint8_t> bad;               ///< will never be there
+    std::vector<uint8_t> bad;               ///< cannot be read
 };
 
 }  // namespace pietra
