@@ -7,7 +7,8 @@
 namespace pietra {
 namespace {
 
-constexpr size_t kGroup = 64;  // of cull_commands.comp.glsl
+constexpr size_t kGroup = 64;                           // of cull_commands.comp.glsl
+constexpr GLint kTurnLocation = 0, kTurnsLocation = 1;  // of cull_block.glsl
 
 GlBuffer makeBuffer(size_t bytes) {
     GLuint name = 0;
@@ -58,7 +59,11 @@ void OcclusionCuller::begin(size_t count) {
     compute(begin_, count);
 }
 
-void OcclusionCuller::end(size_t count) {
+void OcclusionCuller::end(size_t count, bool all) {
+    for (const GlProgram* program : {&boxes_, &end_}) {
+        glProgramUniform1ui(*program, kTurnLocation, turn_);
+        glProgramUniform1ui(*program, kTurnsLocation, all ? 1 : kTurns);
+    }
     glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
     glDepthMask(GL_FALSE);
     glDepthFunc(GL_GEQUAL);

@@ -6,7 +6,9 @@
 //
 // What was seen is kept for each 256 bytes of the arena, by where a patch's indices begin: where
 // two small patches, or one that has gone and one that has come, share them, one may be drawn for
-// nothing. Needs a current context.
+// nothing. Boxes of what is in sight cover the picture many times over, so each of those is looked
+// at in one picture of kTurns: what goes out of sight is drawn a little longer. Needs a current
+// context.
 
 #include <cstdint>
 #include <vector>
@@ -33,14 +35,15 @@ public:
     /// not wait for its drawing (llvmpipe's does not), so this must.
     OcclusionCuller(size_t draws, size_t arena_bytes, bool wait);
 
+    void nextPicture() { ++turn_; }
     /// Of `count` draws: commands, in a ring, which the records follow; both as bound ranges of
     /// storage, kCommandsBinding and kCullBinding. Leaves in seen() the commands for what was seen
     /// last, others with no instance.
     void begin(size_t count);
     /// After seen() has been drawn; the frame block must be bound. Leaves in found() the commands
     /// for what else is in sight. Changes program, vertex array and depth function; neither depth
-    /// nor colour.
-    void end(size_t count);
+    /// nor colour. `all`: looks at everything.
+    void end(size_t count, bool all);
 
     /// Of the last `count` draws: not 0 for those that were not left out. Waits for the GPU: not
     /// for frames.
@@ -51,9 +54,12 @@ public:
     GLuint found() const { return found_; }
 
 private:
+    static constexpr GLuint kTurns = 8;
+
     void compute(const GlProgram& program, size_t count) const;
 
     const bool wait_;
+    GLuint turn_ = 0;
     GlBuffer seen_, found_, last_, now_;
     GlVertexArray no_vertices_;
     GlProgram begin_, boxes_, end_;

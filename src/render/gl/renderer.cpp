@@ -350,7 +350,7 @@ void GlRenderer::State::submit(std::span<const DrawPatch> items, std::span<const
         provideBoxes(items, chunk);
         culler.begin(chunk.size());
         drawCommands(items, chunk, culler.seen(), 0);
-        culler.end(chunk.size());
+        culler.end(chunk.size(), hidden != nullptr);
         drawCommands(items, chunk, culler.found(), 0);
         if (hidden != nullptr) {
             const std::vector<uint8_t> drawn = culler.drawn(chunk.size());
@@ -441,6 +441,7 @@ void GlRenderer::begin(const View& view, const Lattice& lattice, const ShadeSett
     s.setModel(view, lattice);
     s.beginTimer();
     s.targets.clear(settings);
+    s.culler.nextPicture();
     s.drawing = true;
 }
 

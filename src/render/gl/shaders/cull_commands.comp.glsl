@@ -20,7 +20,7 @@ void main() {
     command.instances = last[record.slot] != 0u ? 1u : 0u;
     seen[i] = command;
 #else
-    bool visible = now[record.slot] != 0u || record.always != 0u;
+    bool visible = now[record.slot] != 0u || record.always != 0u || !isTurn(record.slot);
     command.instances = visible && seen[i].instances == 0u ? 1u : 0u;
     found[i] = command;
     last[record.slot] = visible ? 1u : 0u;
