@@ -25,56 +25,76 @@ bool Spill::growMemory(uint64_t end) {
     return true;
 }
 
+/// Under the lock: makes room up to `end`.
+void Spill::extend(uint64_t end) {
+    if (end <= end_) return;
+    if (!in_file_ && !growMemory(end)) {
+        in_file_ = true;
+        file_base_ = end_;
+        file_ = File(space_->directory, File::Mode::kTemporary);
+    }
+    space_->add(end - end_);
+    end_ = end;
+}
+
+/// block(bytes in memory, offset in the data, size) and in_file(offset in the file, in the data,
+/// size), for all parts of a range. Blocks, once there, never move; only the table of them may, so
+/// it alone is read under the lock.
+template <class Block, class InFile>
+void Spill::forParts(uint64_t position, size_t bytes, Block&& block, InFile&& in_file) const {
+    for (size_t done = 0; done < bytes;) {
+        const uint64_t at = position + done;
+        size_t part = std::min(kBlock - size_t(at % kBlock), bytes - done);
+        std::byte* memory = nullptr;
+        {
+            const std::lock_guard lock(mutex_);
+            CHECK_LE(position + bytes, end_);
+            if (!in_file_ || at < file_base_) {
+                if (in_file_) part = std::min(part, size_t(file_base_ - at));
+                memory = blocks_[at / kBlock].get() + at % kBlock;
+            }
+        }
+        if (!memory) {
+            part = bytes - done;
+            in_file(at - file_base_, done, part);
+        } else {
+            block(memory, done, part);
+        }
+        done += part;
+    }
+}
+
 uint64_t Spill::append(std::span<const std::byte> data) {
     uint64_t position;
-    bool in_file;
     {
         const std::lock_guard lock(mutex_);
         position = end_;
-        if (!in_file_ && !growMemory(end_ + data.size())) {
-            in_file_ = true;
-            file_base_ = end_;
-            file_ = File(space_->directory, File::Mode::kTemporary);
-        }
-        end_ += data.size();
-        in_file = in_file_;
-        if (!in_file_) {
-            uint64_t at = position;
-            for (size_t done = 0; done < data.size();) {
-                const size_t offset = at % kBlock;
-                const size_t part = std::min(kBlock - offset, data.size() - done);
-                std::memcpy(blocks_[at / kBlock].get() + offset, data.data() + done, part);
-                done += part;
-                at += part;
-            }
-        }
+        extend(end_ + data.size());
     }
-    space_->add(data.size());
-    if (in_file) file_.writeAt(position - file_base_, data.data(), data.size());
+    write(position, data);
     return position;
 }
 
-void Spill::read(uint64_t position, std::span<std::byte> data) const {
-    const auto inFile = [&] {
+void Spill::write(uint64_t position, std::span<const std::byte> data) {
+    {
         const std::lock_guard lock(mutex_);
-        CHECK_LE(position + data.size(), end_);
-        return in_file_ && position >= file_base_;
-    };
-    if (inFile()) return file_.readAt(position - file_base_, data.data(), data.size());
-    // Blocks, once there, never move; only the table of them may, so it alone is read under the
-    // lock.
-    for (size_t done = 0; done < data.size();) {
-        const std::byte* block;
-        {
-            const std::lock_guard lock(mutex_);
-            block = blocks_[position / kBlock].get();
-        }
-        const size_t offset = position % kBlock;
-        const size_t part = std::min(kBlock - offset, data.size() - done);
-        std::memcpy(data.data() + done, block + offset, part);
-        done += part;
-        position += part;
+        extend(position + data.size());
     }
+    forParts(
+        position, data.size(),
+        [&](std::byte* to, size_t from, size_t size) { std::memcpy(to, data.data() + from, size); },
+        [&](uint64_t to, size_t from, size_t size) {
+            file_.writeAt(to, data.data() + from, size);
+        });
+}
+
+void Spill::read(uint64_t position, std::span<std::byte> data) const {
+    forParts(
+        position, data.size(),
+        [&](const std::byte* from, size_t to, size_t size) {
+            std::memcpy(data.data() + to, from, size);
+        },
+        [&](uint64_t from, size_t to, size_t size) { file_.readAt(from, data.data() + to, size); });
 }
 
 void Spill::clear() {

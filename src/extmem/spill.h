@@ -1,8 +1,8 @@
 #pragma once
-// Temporary data of a build: an append-only store that lies in memory as far as the budget allows
-// and in an unlinked file beyond. Positions are stable; any thread may append and read at any time.
-// What was appended is read back by position and size; there is no order between appends of
-// different threads.
+// Temporary data of a build: a store that lies in memory as far as the budget allows and in an
+// unlinked file beyond. Positions are stable; any thread may append and read at any time. What was
+// appended is read back by position and size; there is no order between appends of different
+// threads.
 
 #include <atomic>
 #include <cstddef>
@@ -39,6 +39,9 @@ public:
     /// Returns the position of the data. Throws IoError (disk full).
     uint64_t append(std::span<const std::byte> data);
     void read(uint64_t position, std::span<std::byte> data) const;
+    /// At a place of the caller's choice, as often as it likes; what lies between the end so far
+    /// and there is undefined. Nobody reads or writes the same bytes meanwhile. Throws IoError.
+    void write(uint64_t position, std::span<const std::byte> data);
     uint64_t bytes() const { return end_; }
     /// Frees memory and file.
     void clear();
@@ -46,6 +49,9 @@ public:
 private:
     static constexpr size_t kBlock = size_t(4) << 20;
     bool growMemory(uint64_t end);
+    void extend(uint64_t end);
+    template <class Block, class InFile>
+    void forParts(uint64_t position, size_t bytes, Block&& block, InFile&& in_file) const;
     TempSpace* space_;
     mutable std::mutex mutex_;
     std::vector<std::unique_ptr<std::byte[]>>

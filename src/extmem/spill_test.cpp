@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
+#include <span>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -34,6 +36,27 @@ TEST(Spill, givesBackWhatWasAppendedFromMemoryAndFile) {
     spill.clear();
     EXPECT_EQ(budget.used(), 0u);
     EXPECT_EQ(space.bytes, 0u);
+}
+
+TEST(Spill, isWrittenAtAnyPlace) {
+    for (const size_t limit : {size_t(0), size_t(4) << 20, size_t(64) << 20}) {
+        Budget budget(limit);
+        TempSpace space{testing::TempDir(), &budget, 0};
+        Spill spill(space);
+        constexpr size_t kPiece = 100'003, kPieces = 100;
+        for (size_t i = 0; i < kPieces; ++i) {
+            const size_t at = i * 37 % kPieces;
+            spill.write(at * kPiece, pattern(at + 1, kPiece));
+            spill.write(at * kPiece, pattern(at, kPiece));
+        }
+        EXPECT_EQ(spill.bytes(), kPieces * kPiece);
+        EXPECT_EQ(space.bytes, spill.bytes());
+        std::vector<std::byte> all(kPieces * kPiece);
+        spill.read(0, all);
+        for (size_t i = 0; i < kPieces; ++i)
+            EXPECT_TRUE(
+                std::ranges::equal(std::span(all).subspan(i * kPiece, kPiece), pattern(i, kPiece)));
+    }
 }
 
 TEST(File, refusesDirectoriesAndMissingFiles) {
