@@ -10,35 +10,36 @@
 namespace pietra::pmesh {
 namespace {
 
-/// Pages on their way from the order of encoding to that of the file.
+/// Pages on their way from the order of encoding to that of the file: nodes by number, which grow
+/// level by level.
 class PageSpill {
 public:
-    explicit PageSpill(TempSpace& space) : pages_(space) {}
+    explicit PageSpill(TempSpace& space) : pages_(space), entries_(space) {}
 
     void add(NodeIndex n, const NodeRow& row, const OperationNode& node, int lattice_shift) {
         const std::vector<std::byte> page = encodeNode(node);
-        if (entry_.size() <= n) entry_.resize(n + 1);
-        entry_[n] = {tableNode(n, row, node, lattice_shift), pages_.append(page), page.size()};
+        const Entry entry{tableNode(n, row, node, lattice_shift), pages_.append(page), page.size()};
+        entries_.write(n * sizeof entry, std::as_bytes(std::span(&entry, 1)));
+        if (of_level_.size() <= row.level) of_level_.resize(row.level + 1u);
+        ++of_level_[row.level];
     }
 
     /// Fine to coarse.
     void write(ModelWriter& writer, Progress& progress) const {
         std::vector<std::byte> page;
-        for (size_t end = entry_.size(); end > 0;) {
-            size_t begin = end;
-            const uint16_t level = entry_[end - 1].node.level;
-            while (begin > 0 && entry_[begin - 1].node.level == level) --begin;
-            writer.beginLevel(level);
-            for (size_t n = begin; n < end; ++n) {
-                Node node = entry_[n].node;
-                for (NodeIndex& child : node.child)
+        uint64_t end = entries_.bytes() / sizeof(Entry);
+        for (size_t level = of_level_.size(); level-- > 0; end -= of_level_[level]) {
+            writer.beginLevel(uint32_t(level));
+            for (uint64_t n = end - of_level_[level]; n < end; ++n) {
+                Entry entry;
+                entries_.read(n * sizeof entry, std::as_writable_bytes(std::span(&entry, 1)));
+                for (NodeIndex& child : entry.node.child)
                     if (child != kNoNode) child -= NodeIndex(end);
-                page.resize(entry_[n].bytes);
-                pages_.read(entry_[n].position, page);
-                writer.addPage(page, {&node, 1});
+                page.resize(entry.bytes);
+                pages_.read(entry.position, page);
+                writer.addPage(page, {&entry.node, 1});
+                progress.tick();
             }
-            progress.tick(end - begin);
-            end = begin;
         }
     }
 
@@ -48,8 +49,8 @@ private:
         uint64_t position = 0;
         size_t bytes = 0;
     };
-    Spill pages_;
-    std::vector<Entry> entry_;
+    Spill pages_, entries_;
+    std::vector<uint64_t> of_level_;
 };
 
 }  // namespace
@@ -80,12 +81,12 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
                         });
     }
     report.levels = counts.levels;
-    report.nodes = forest.row.size();
     // The finest mesh is the input but for the lattice and what offsets cannot tell.
     const double rounding = double(counts.largest_error) * double(1 << info.lattice.shift);
     info.quantisation_error = float(double(info.quantisation_error) + 1.7320509 * rounding);
-    progress.beginStage("write", forest.row.size());
+    progress.beginStage("write", counts.operations / kNodeSlots);
     pages.write(work.writer, progress);
+    report.nodes = work.writer.nodeCount();
     work.writer.finish(info, {}, encodeBase(forest));
     progress.endStage();
     work.finish(report);

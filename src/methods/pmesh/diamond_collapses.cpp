@@ -19,14 +19,17 @@ constexpr uint32_t kLocal = 1u << 31;
 
 /// What a vertex carries from diamond to diamond, in the place of scalars.
 struct VertexState {
-    std::array<uint32_t, 2> key{};
-    uint32_t number = kNoVertex;  ///< of all vertices; given in its first diamond
+    std::array<uint32_t, 2> key{};  ///< of its place in the input
+    uint32_t number = kNoVertex;    ///< given in its first diamond
+    uint32_t is_shared = 0;         ///< has other numbers, too
     VertexHistory history;
 
-    uint64_t name() const { return key[0] | uint64_t(key[1]) << 32; }
-    static VertexState of(uint64_t name) {
+    uint64_t place() const { return key[0] | uint64_t(key[1]) << 32; }
+    VertexId id() const { return is_shared ? kShared | place() : number; }
+    static VertexState at(const Vec3i& position) {
         VertexState state;
-        state.key = {uint32_t(name), uint32_t(name >> 32)};
+        const uint64_t place = latticeKey(position);
+        state.key = {uint32_t(place), uint32_t(place >> 32)};
         return state;
     }
 };
@@ -91,9 +94,8 @@ private:
 void Collapser::add(const Mesh& child, bool is_leaf, uint8_t label) {
     local_.resize(child.vertexCount());
     for (size_t v = 0; v < child.vertexCount(); ++v) {
-        const VertexState state =
-            is_leaf ? VertexState::of(latticeKey(child.position[v])) : stateOf(child, v);
-        const auto [id, is_new] = ids_.insert(state.name(), uint32_t(mesh_.vertexCount()));
+        const VertexState state = is_leaf ? VertexState::at(child.position[v]) : stateOf(child, v);
+        const auto [id, is_new] = ids_.insert(state.place(), uint32_t(mesh_.vertexCount()));
         local_[v] = id;
         if (!is_new) {
             CHECK(mesh_.position[id] == child.position[v]);
@@ -145,7 +147,7 @@ void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult&
     std::vector<uint32_t> survivor(mesh.vertexCount(), kNoVertex);
     std::vector<uint8_t> gone(state_.size(), 0);
     for (const CollapseLink& link : recorder.links())
-        if (link.u != kNoVertex) gone[link.u] = 1;
+        if (link.u != CollapseLink::kNone) gone[link.u] = 1;
     for (uint32_t v = 0; v < state_.size(); ++v)
         if (!gone[v] && simplified_.vertex_map[v] != kNone) {
             CHECK_EQ(survivor[simplified_.vertex_map[v]], kNoVertex);
@@ -200,7 +202,6 @@ public:
         progress_.beginStage("collapse", input_.leaves.triangles * 3);
         for (int level = input_.leaves.tree->deepestLevel(); level >= 0; --level) runLevel(level);
         runRoot();
-        out_.vertices = vertices_;
     }
 
 private:
@@ -212,14 +213,6 @@ private:
         worker.add(worker.scratch.mesh, cell.blob.store == &input_.store, label);
     }
     void take(DiamondResult& result);
-    /// Only what other diamonds may have, too, must be looked up.
-    uint32_t numberOf(const VertexState& vertex, bool inside) {
-        if (vertex.number != kNoVertex) return vertex.number;
-        if (inside) return vertices_++;
-        const auto [number, is_new] = number_of_.insert(vertex.name(), vertices_);
-        vertices_ += is_new;
-        return number;
-    }
     static uint32_t globalRecord(uint32_t record, uint32_t first) {
         return record == kNoOperation || record < kLocal ? record : first + (record - kLocal);
     }
@@ -233,8 +226,6 @@ private:
     PerThread<Collapser> workers_;
     std::unordered_map<CellId, Cell> below_, cells_;
     std::unique_ptr<CellStore> store_below_, store_;
-    KeyMap number_of_;
-    uint32_t vertices_ = 0;
 };
 
 void LevelCollapser::runLevel(int level) {
@@ -286,21 +277,28 @@ void LevelCollapser::take(DiamondResult& result) {
     const uint32_t first = out_.store.size();
     CHECK_LT(first + result.record.size(), size_t(kLocal));
     std::vector<uint32_t> number;
-    for (size_t v = 0; v < result.vertex.size(); ++v)
-        number.push_back(numberOf(result.vertex[v], result.inside[v]));
-    for (size_t i = 0; i < result.record.size(); ++i) {
-        CollapseLink& link = result.link[i];
-        CollapseRecord& r = result.record[i];
-        if (link.u != kNoVertex) link.u = number[link.u];
-        for (uint32_t& child : link.child) child = globalRecord(child, first);
-        for (uint8_t k = 0; k < r.ring_size; ++k) r.ring[k] = number[r.ring[k]];
-        out_.store.append(link, r);
+    std::vector<VertexAlias> aliases;
+    for (size_t v = 0; v < result.vertex.size(); ++v) {
+        VertexState& state = result.vertex[v];
+        if (state.number == kNoVertex) {
+            state.number = out_.numbers++;
+            state.is_shared = !result.inside[v];
+            if (state.is_shared) aliases.push_back({state.id(), state.number});
+        }
+        number.push_back(state.number);
     }
+    for (CollapseLink& link : result.link) {
+        if (link.u != CollapseLink::kNone) link.u = result.vertex[link.u].id();
+        for (uint32_t& child : link.child) child = globalRecord(child, first);
+    }
+    out_.store.append(result.link, result.record, number);
+    out_.store.append(aliases);
     for (size_t c = 0; c < result.ids.size(); ++c) {
         Mesh& mesh = result.cells[c].mesh;
         for (size_t v = 0; v < mesh.vertexCount(); ++v) {
             VertexState state = stateOf(mesh, v);
             state.history.last = globalRecord(state.history.last, first);
+            state.is_shared = result.vertex[state.number].is_shared;
             state.number = number[state.number];
             std::memcpy(&mesh.scalar[kStateFloats * v], &state, sizeof state);
         }
@@ -334,7 +332,7 @@ void LevelCollapser::runRoot() {
     out_.base = std::move(result.cells[0].mesh);
     for (size_t v = 0; v < out_.base.vertexCount(); ++v) {
         const VertexState state = stateOf(out_.base, v);
-        out_.base_vertex.push_back(state.number);
+        out_.base_vertex.push_back(state.id());
         out_.base_last.push_back(state.history.last);
     }
     out_.base.scalar.clear();
@@ -345,6 +343,7 @@ void LevelCollapser::runRoot() {
 void collapseByDiamonds(InputLeaves& input, uint32_t patch_triangles, int jobs, TempSpace& space,
                         Progress& progress, Collapses& out) {
     LevelCollapser(input, patch_triangles, jobs, space, progress, out).run();
+    input.store.clear();
 }
 
 }  // namespace pietra::pmesh

@@ -2,21 +2,21 @@
 // The collapses of a whole model, found diamond by diamond by the coarsening engine: construction
 // of progressive meshes without ever having the whole mesh in memory, on all cores.
 //
-// Between diamonds a vertex carries its name (the key of its place in the input, which no other
-// has), the record of its last collapse, that one's height and its error. Vertices on the outer
+// Between diamonds a vertex carries the key of its place in the input, which no other has, the
+// record of its last collapse, that one's height and its error. Vertices on the outer
 // border of a diamond take part in no collapse there: their stars lie in several. So all that
 // orders collapses, the heights around, is known where it is needed.
 //
-// Ids and records are counted in the order of the diamonds, from fine to coarse: the result does
+// Records are counted in the order of the diamonds, from fine to coarse: the result does
 // not depend on threads.
 
 #include "coarsen/input_leaves.h"
-#include "methods/pmesh/recorder.h"
+#include "methods/pmesh/collapses.h"
 
 namespace pietra::pmesh {
 
-/// Consumes the leaves; `out` is empty. Memory beside the diamonds at work: a table of the vertices
-/// that lay on a diamond's border when they first came, about three bytes a triangle.
+/// Consumes the leaves; `out` is empty. Memory: the diamonds at work, and some tens of bytes a
+/// cell.
 void collapseByDiamonds(InputLeaves& input, uint32_t patch_triangles, int jobs, TempSpace& space,
                         Progress& progress, Collapses& out);
 

@@ -5,6 +5,7 @@
 
 #include "base/check.h"
 #include "methods/pmesh/node_packer.h"
+#include "methods/pmesh/ring_starts.h"
 
 namespace pietra::pmesh {
 namespace {
@@ -34,46 +35,68 @@ struct FromBelow {
 
 class Encoder {
 public:
-    Encoder(const Collapses& collapses, Packing& packing, BuildCounts& counts, const NodeSink& sink,
+    Encoder(const Collapses& collapses, TempSpace& space, BuildCounts& counts, const NodeSink& sink,
             NodeForest& forest)
         : collapses_(collapses),
-          packing_(packing),
+          packing_(space),
+          shapes_(collapses.store.shapes()),
+          starts_(collapses, space),
           counts_(counts),
           sink_(sink),
           forest_(forest),
           step_(double(1 << forest.lattice.shift)) {}
 
     void run() {
+        const auto base_vertices = uint32_t(collapses_.base.vertexCount());
+        packCollapses(collapses_, packing_,
+                      [&](VertexId v, OperationId o) { setName(v, base_vertices + o); });
         makeBase();
-        std::vector<std::vector<FromAbove>> roots(forest_.row.size());
-        for (size_t v = 0; v < forest_.base_vertex.size(); ++v)
-            if (const OperationId o = forest_.base_operation[v]; o != kNoOperation)
-                roots[nodeOf(o)].push_back({forest_.base_vertex[v].position(), kNoChildCode});
-        for (NodeIndex n = 0; n < forest_.row.size(); ++n)
-            if (forest_.row[n].parent == kNoNode) encodeNode(n, roots[n]);
+        starts_.find();
+        std::vector<std::vector<FromAbove>> roots;
+        for (size_t v = 0; v < forest_.base_vertex.size(); ++v) {
+            const OperationId o = forest_.base_operation[v];
+            if (o == kNoOperation) continue;
+            roots.resize(std::max<size_t>(roots.size(), nodeOf(o) + 1));
+            roots[nodeOf(o)].push_back({forest_.base_vertex[v].position(), kNoChildCode});
+        }
+        if (roots.empty()) roots.emplace_back();  // of the one node that there is at least
+        for (NodeIndex n = 0; n < roots.size(); ++n) encodeNode(n, roots[n]);
     }
 
 private:
     struct Work {
+        NodeRow row;
         OperationNode node;
         std::vector<PackedSlot> slot;
         std::vector<Operation> operation;
         std::vector<FromAbove> above;  // of each slot
         std::array<std::vector<FromAbove>, 2> children;
         std::array<std::vector<FromBelow>, 2> below;
+        std::array<NodeRow, 2> child;
+    };
+    /// What a node leaves to its parent.
+    struct Encoded {
+        NodeRow row;
+        std::vector<FromBelow> told;
     };
 
+    void setName(VertexId vertex, uint32_t name) {
+        starts_.addName(vertex, name);
+        if (!counts_.name_of.empty()) counts_.name_of[vertex] = name;
+    }
     void makeBase();
-    std::vector<FromBelow> encodeNode(NodeIndex n, std::span<const FromAbove> frontier);
-    void refine(Work& work) const;
-    Operation encodeOperation(const CollapseRecord& r, const Vec3i& from) const;
-    void setRanks(Operation& o, const CollapseRecord& r) const;
-    void setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& from, uint32_t kinds) const;
+    Encoded encodeNode(NodeIndex n, std::span<const FromAbove> frontier);
+    void refine(Work& work);
+    Operation encodeOperation(uint32_t record, const CollapseShape& r, const Vec3i& from);
+    void setRanks(Operation& o, uint32_t record, const CollapseShape& r);
+    void setOffsets(Operation& o, const CollapseShape& r, const Vec3i& from, uint32_t kinds) const;
     static void saturate(Work& work);
-    void bound(NodeIndex n, const Work& work);
+    static void bound(Work& work);
 
     const Collapses& collapses_;
-    Packing& packing_;
+    Packing packing_;
+    CachedRecords<CollapseShape> shapes_;
+    RingStarts starts_;
     BuildCounts& counts_;
     const NodeSink& sink_;
     NodeForest& forest_;
@@ -84,47 +107,51 @@ void Encoder::makeBase() {
     const Mesh& base = collapses_.base;
     forest_.base_triangle = base.triangle;
     forest_.base_operation = packing_.base_operation;
-    forest_.row = packing_.row;
-    for (OperationId& maker : packing_.maker)
-        if (maker != kNoOperation) maker += uint32_t(base.vertexCount());
-    counts_.name_of = std::move(packing_.maker);
     for (uint32_t v = 0; v < base.vertexCount(); ++v) {
         const Vec3i p = base.position[v] >> forest_.lattice.shift;
         forest_.base_vertex.push_back({p.x, p.y, p.z, packNormal(base.normal[v])});
-        counts_.name_of[collapses_.base_vertex[v]] = v;
+        setName(collapses_.base_vertex[v], v);
     }
 }
 
-std::vector<FromBelow> Encoder::encodeNode(NodeIndex n, std::span<const FromAbove> frontier) {
+Encoder::Encoded Encoder::encodeNode(NodeIndex n, std::span<const FromAbove> frontier) {
     Work work;
-    work.slot = packing_.slots(n);
+    {
+        PackedNode packed = packing_.node(n);
+        work.row = packed.row;
+        work.slot = std::move(packed.slot);
+    }
     work.above.assign(frontier.begin(), frontier.end());
     work.node.frontier = uint32_t(frontier.size());
     refine(work);
     for (const size_t side : {0u, 1u}) {
-        const NodeIndex child = forest_.row[n].child[side];
-        if (child != kNoNode) work.below[side] = encodeNode(child, work.children[side]);
+        const NodeIndex child = work.row.child[side];
+        if (child == kNoNode) continue;
+        Encoded encoded = encodeNode(child, work.children[side]);
+        work.child[side] = encoded.row;
+        work.below[side] = std::move(encoded.told);
         for (const FromBelow& b : work.below[side])
             work.node.reference_level[side].push_back(b.level);
     }
     saturate(work);
-    bound(n, work);
+    bound(work);
     std::vector<FromBelow> told;
     for (uint32_t s = 0; s < work.node.frontier; ++s) {
         const NodeOperation& o = work.node.operation[s];
         told.push_back({uint16_t(o.structure.level()), o.radius, o.error});
     }
-    sink_(n, forest_.row[n], work.node);
-    return told;
+    sink_(n, work.row, work.node);
+    return {work.row, std::move(told)};
 }
 
 /// From slot to slot, as the decoder will.
-void Encoder::refine(Work& work) const {
+void Encoder::refine(Work& work) {
     std::array<uint32_t, 3> next{work.node.frontier, 0, 0};
     for (uint32_t s = 0; s < work.slot.size(); ++s) {
-        const CollapseRecord r = collapses_.store.record(work.slot[s].record);
+        const uint32_t record = work.slot[s].record;
+        const CollapseShape r = shapes_[record];
         const FromAbove above = work.above[s];
-        Operation o = encodeOperation(r, above.centre);
+        Operation o = encodeOperation(record, r, above.centre);
         if (!o.isDummy()) setOffsets(o, r, above.centre, work.slot[s].kinds);
         std::array<ChildCode, 2> code{kNoChildCode, o.isDummy() ? above.before : kNoChildCode};
         for (const int end : {0, 1}) {
@@ -148,14 +175,14 @@ void Encoder::refine(Work& work) const {
     }
 }
 
-Operation Encoder::encodeOperation(const CollapseRecord& r, const Vec3i& from) const {
+Operation Encoder::encodeOperation(uint32_t record, const CollapseShape& r, const Vec3i& from) {
     Operation o{};
     o.level = uint16_t(collapses_.largest_height - r.height);
     o.normal = r.normal;
     o.radius = uint16_t(encodeRoundedUp<11>(r.radius));
     o.error = errorCode(double(r.error) / step_);
     if (r.ring_size > 0) {
-        setRanks(o, r);
+        setRanks(o, record, r);
         return o;
     }
     // A dummy: to where the vertex is to be, as far as sixteen bits reach.
@@ -170,18 +197,15 @@ Operation Encoder::encodeOperation(const CollapseRecord& r, const Vec3i& from) c
     return o;
 }
 
-void Encoder::setRanks(Operation& o, const CollapseRecord& r) const {
-    const auto name = [&](uint32_t i) { return counts_.name_of[r.ring[i]]; };
-    uint32_t least = 0;
-    for (uint32_t i = 1; r.closed && i < r.ring_size; ++i)
-        if (name(i) < name(least)) least = i;
+void Encoder::setRanks(Operation& o, uint32_t record, const CollapseShape& r) {
+    const uint32_t least = r.closed ? starts_.of(record) : 0;
     const auto rank = [&](uint32_t place) {
         return place == kNoRank ? kNoRank : (place + r.ring_size - least) % r.ring_size;
     };
     o.ranks = uint8_t(rank(r.left) | rank(r.right) << 4);
 }
 
-void Encoder::setOffsets(Operation& o, const CollapseRecord& r, const Vec3i& from,
+void Encoder::setOffsets(Operation& o, const CollapseShape& r, const Vec3i& from,
                          uint32_t kinds) const {
     const std::array<Vec3i, 2> offset{r.position[0] - from, r.position[1] - from};
     const QuantisedOffsets q = quantiseOffsets(offset);
@@ -224,8 +248,8 @@ void Encoder::saturate(Work& work) {
 
 /// The sphere around those of the operations referred to from above, which enclose all below, and
 /// around the children's, whose rounding may stick out.
-void Encoder::bound(NodeIndex n, const Work& work) {
-    NodeRow& row = forest_.row[n];
+void Encoder::bound(Work& work) {
+    NodeRow& row = work.row;
     Box3i box;
     for (uint32_t s = 0; s < work.node.frontier; ++s) box.add(work.above[s].centre);
     if (box.empty()) return;
@@ -237,9 +261,9 @@ void Encoder::bound(NodeIndex n, const Work& work) {
     };
     for (uint32_t s = 0; s < work.node.frontier; ++s)
         enclose(work.above[s].centre, work.operation[s].radius, work.operation[s].error);
-    for (const NodeIndex c : row.child)
-        if (c != kNoNode)
-            enclose(forest_.row[c].centre, forest_.row[c].radius, forest_.row[c].error);
+    for (const size_t side : {0u, 1u})
+        if (row.child[side] != kNoNode)
+            enclose(work.child[side].centre, work.child[side].radius, work.child[side].error);
     row.radius = uint16_t(encodeRoundedUp<11>(radius));
 }
 
@@ -251,13 +275,9 @@ NodeForest encode(const Collapses& collapses, const Lattice& lattice, TempSpace&
     counts.levels = collapses.largest_height;
     counts.dummies = collapses.dummies;
     counts.operations = collapses.store.size();
-    const Reservation names = space.budget->reserve(sizeof(OperationId) * collapses.vertices,
-                                                    "the names of all vertices of a mesh");
-    Packing packing(space);
-    packCollapses(collapses, packing);
     NodeForest forest;
     forest.lattice = lattice;
-    Encoder(collapses, packing, counts, sink, forest).run();
+    Encoder(collapses, space, counts, sink, forest).run();
     return forest;
 }
 

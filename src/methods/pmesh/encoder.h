@@ -11,8 +11,8 @@
 
 #include <functional>
 
+#include "methods/pmesh/collapses.h"
 #include "methods/pmesh/operation_node.h"
-#include "methods/pmesh/recorder.h"
 
 namespace pietra::pmesh {
 
@@ -22,15 +22,16 @@ struct BuildCounts {
     uint32_t levels = 0;
     uint64_t operations = 0;
     uint64_t dummies = 0;
-    uint64_t inexact_ends = 0;      ///< vertices that no operation brings exactly to their places
-    uint32_t largest_error = 0;     ///< of these, in steps along an axis
-    std::vector<uint32_t> name_of;  ///< one a vertex of the collapses, kNoVertex for others
+    uint64_t inexact_ends = 0;   ///< vertices that no operation brings exactly to their places
+    uint32_t largest_error = 0;  ///< of these, in steps along an axis
+    /// One a vertex: set where it had this size, for tests, whose vertices are told by places.
+    std::vector<uint32_t> name_of;
 };
 
 /// Told of each node once, after its children.
 using NodeSink = std::function<void(NodeIndex, const NodeRow&, OperationNode&)>;
 
-/// Base mesh and rows; nodes go to the sink. There is one at least.
+/// The base mesh; rows and nodes go to the sink. There is one at least.
 NodeForest encode(const Collapses& collapses, const Lattice& lattice, TempSpace& space,
                   BuildCounts& counts, const NodeSink& sink);
 

@@ -1,7 +1,9 @@
 #include "methods/pmesh/in_core_builder.h"
 
 #include <algorithm>
+#include <numeric>
 
+#include "methods/pmesh/encoder.h"
 #include "methods/pmesh/twins.h"
 #include "simplify/simplify.h"
 
@@ -36,24 +38,25 @@ SimplifyOutput collapseAll(const Mesh& mesh, int shift, Recorder& recorder) {
 }
 
 void takeCollapses(Recorder& recorder, const SimplifyOutput& simplified, Collapses& out) {
-    out.vertices = simplified.vertex_map.size();
     out.largest_height = recorder.largestHeight();
     out.dummies = recorder.dummies();
     out.refused = recorder.refused();
-    std::vector<uint8_t> gone(out.vertices, 0);
-    for (size_t i = 0; i < recorder.records().size(); ++i) {
-        const CollapseLink& link = recorder.links()[i];
-        if (link.u != kNoVertex) gone[link.u] = 1;
-        out.store.append(link, recorder.records()[i]);
-    }
+    std::vector<uint32_t> number(simplified.vertex_map.size());
+    std::iota(number.begin(), number.end(), 0u);
+    out.numbers = uint32_t(number.size());
+    std::vector<uint8_t> gone(number.size(), 0);
+    for (const CollapseLink& link : recorder.links())
+        if (link.u != CollapseLink::kNone) gone[link.u] = 1;
+    out.store.append(recorder.links(), recorder.records(), number);
     out.base = simplified.mesh;
-    out.base_vertex.assign(out.base.vertexCount(), kNoVertex);
-    for (uint32_t v = 0; v < out.vertices; ++v)
+    out.base_vertex.resize(out.base.vertexCount());
+    for (uint32_t v = 0; v < number.size(); ++v)
         if (!gone[v] && simplified.vertex_map[v] != kNone)
             out.base_vertex[simplified.vertex_map[v]] = v;
     for (uint32_t slot = 0; slot < out.base.vertexCount(); ++slot) {
-        out.base.normal[slot] = recorder.normalOf(out.base_vertex[slot]);
-        out.base_last.push_back(recorder.historyOf(out.base_vertex[slot]).last);
+        const auto v = uint32_t(out.base_vertex[slot]);
+        out.base.normal[slot] = recorder.normalOf(v);
+        out.base_last.push_back(recorder.historyOf(v).last);
     }
 }
 
@@ -76,13 +79,18 @@ NodeForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget, BuildC
     TempSpace space{"", &budget, 0};
     Collapses collapses(space);
     takeCollapses(recorder, base, collapses);
+    if (counts) counts->name_of.resize(mesh.vertexCount(), kNoVertex);
     std::vector<OperationNode> nodes;
-    NodeForest forest =
-        encode(collapses, lattice, space, c, [&](NodeIndex n, const NodeRow&, OperationNode& node) {
-            nodes.resize(std::max<size_t>(nodes.size(), n + 1));
-            nodes[n] = std::move(node);
-        });
+    std::vector<NodeRow> rows;
+    NodeForest forest = encode(collapses, lattice, space, c,
+                               [&](NodeIndex n, const NodeRow& row, OperationNode& node) {
+                                   nodes.resize(std::max<size_t>(nodes.size(), n + 1));
+                                   rows.resize(nodes.size());
+                                   nodes[n] = std::move(node);
+                                   rows[n] = row;
+                               });
     forest.node = std::move(nodes);
+    forest.row = std::move(rows);
     return forest;
 }
 

@@ -1,6 +1,7 @@
 #include "methods/pmesh/node_packer.h"
 
 #include <algorithm>
+#include <cstring>
 #include <numeric>
 #include <queue>
 #include <unordered_map>
@@ -100,21 +101,18 @@ const std::vector<uint8_t>& Cutter::cutWithin(std::span<const Subtree> trees, si
 
 class Packer {
 public:
-    Packer(const Collapses& collapses, Packing& packing)
-        : collapses_(collapses), packing_(packing) {
-        packing_.maker.assign(collapses.vertices, kNoOperation);
-    }
+    Packer(const Collapses& collapses, Packing& packing, const MakerSink& makes)
+        : collapses_(collapses),
+          links_(collapses.store.links()),
+          packing_(packing),
+          makes_(makes) {}
 
     void run() {
         std::vector<Subtree> all;
         for (const uint32_t record : collapses_.base_last)
             if (record != kNoOperation) all.push_back(subtree(record, link(record)));
         addRoots(std::move(all));  // of an empty model one node, without operations
-        while (!waiting_.empty()) {
-            const Waiting next = std::move(waiting_.front());
-            waiting_.pop();
-            fill(next);
-        }
+        for (NodeIndex n = 0; n < packing_.size(); ++n) fill(n);
         for (const uint32_t record : collapses_.base_last) {
             const auto found = root_.find(record);
             packing_.base_operation.push_back(found == root_.end() ? kNoOperation : found->second);
@@ -122,24 +120,20 @@ public:
     }
 
 private:
-    struct Waiting {
-        NodeIndex node;
-        std::vector<uint32_t> frontier;
-    };
     /// A record that the node being filled takes or refers to.
     struct Known {
         CollapseLink link;
         bool is_taken = false;
     };
 
-    CollapseLink link(uint32_t record) const { return collapses_.store.link(record); }
+    const CollapseLink& link(uint32_t record) { return links_[record]; }
     static Subtree subtree(uint32_t record, const CollapseLink& link) {
         return {record, link.operations, link.box};
     }
     void addRoots(std::vector<Subtree> trees);
-    NodeIndex addNode(NodeIndex parent, std::span<const Subtree> frontier);
-    void fill(const Waiting& waiting);
-    void choose(const Waiting& waiting);
+    NodeIndex addNode(NodeIndex parent, uint32_t level, std::span<const Subtree> frontier);
+    void fill(NodeIndex n);
+    void choose(std::span<const PackedSlot> frontier);
     /// One a reference.
     std::vector<uint8_t> sidesOf() {
         uint64_t operations = 0;
@@ -150,8 +144,9 @@ private:
     }
 
     const Collapses& collapses_;
+    CachedRecords<CollapseLink> links_;
     Packing& packing_;
-    std::queue<Waiting> waiting_;
+    const MakerSink& makes_;
     std::unordered_map<uint32_t, OperationId> root_;
     Cutter cutter_;
     // Of the node being filled:
@@ -161,7 +156,7 @@ private:
 
 void Packer::addRoots(std::vector<Subtree> trees) {
     if (trees.size() <= kNodeSlots) {
-        const NodeIndex node = addNode(kNoNode, trees);
+        const NodeIndex node = addNode(kNoNode, 0, trees);
         for (uint32_t s = 0; s < trees.size(); ++s)
             root_[trees[s].operation] = operationId(node, s);
         return;
@@ -175,28 +170,27 @@ void Packer::addRoots(std::vector<Subtree> trees) {
     }
 }
 
-NodeIndex Packer::addNode(NodeIndex parent, std::span<const Subtree> frontier) {
-    const NodeIndex node = NodeIndex(packing_.row.size());
-    NodeRow& row = packing_.row.emplace_back();
-    row.parent = parent;
-    row.level = parent == kNoNode ? uint16_t(0) : uint16_t(packing_.row[parent].level + 1);
-    packing_.frontier.push_back(uint32_t(frontier.size()));
-    Waiting waiting{node, {}};
-    for (const Subtree& tree : frontier) waiting.frontier.push_back(tree.operation);
-    waiting_.push(std::move(waiting));
-    return node;
+NodeIndex Packer::addNode(NodeIndex parent, uint32_t level, std::span<const Subtree> frontier) {
+    const NodeIndex n = packing_.size();
+    PackedNode node;
+    node.row.parent = parent;
+    node.row.level = uint16_t(level);
+    node.frontier = uint32_t(frontier.size());
+    for (const Subtree& tree : frontier) node.slot.push_back({tree.operation, 0});
+    packing_.put(n, node);
+    return n;
 }
 
 /// Numbers the slots: those referred to from above, then each as it is referred to.
-void Packer::fill(const Waiting& waiting) {
-    choose(waiting);
-    std::vector<PackedSlot> slots;
-    for (const uint32_t record : waiting.frontier) slots.push_back({record, 0});
+void Packer::fill(NodeIndex n) {
+    PackedNode node = packing_.node(n);
+    std::vector<PackedSlot>& slots = node.slot;
+    choose(slots);
     std::vector<std::array<uint32_t, 2>> beyond;  // slot and end of each reference
     reference_.clear();
     for (uint32_t s = 0; s < slots.size(); ++s) {
         const CollapseLink& link = known_.at(slots[s].record).link;
-        if (link.u != kNoVertex) packing_.maker[link.u] = operationId(waiting.node, s);
+        if (link.u != CollapseLink::kNone) makes_(link.u, operationId(n, s));
         for (const uint32_t end : {0u, 1u}) {
             const uint32_t child = link.child[end];
             if (child == kNoOperation) continue;
@@ -213,20 +207,18 @@ void Packer::fill(const Waiting& waiting) {
     const std::vector<uint8_t> side = sidesOf();
     for (size_t i = 0; i < side.size(); ++i)
         slots[beyond[i][0]].kinds |= (2u + side[i]) << (2 * beyond[i][1]);
-    packing_.row[waiting.node].operations = uint32_t(slots.size());
-    packing_.append(slots);
+    node.row.operations = uint32_t(slots.size());
     for (const size_t which : {0u, 1u}) {
         std::vector<Subtree> part;
         for (size_t i = 0; i < side.size(); ++i)
             if (side[i] == which) part.push_back(reference_[i]);
-        if (part.empty()) continue;
-        const NodeIndex child = addNode(waiting.node, part);
-        packing_.row[waiting.node].child[which] = child;
+        if (!part.empty()) node.row.child[which] = addNode(n, node.row.level + 1u, part);
     }
+    packing_.put(n, node);
 }
 
 /// Takes what fits into the node beside the frontier.
-void Packer::choose(const Waiting& waiting) {
+void Packer::choose(std::span<const PackedSlot> frontier) {
     known_.clear();
     std::priority_queue<std::pair<float, uint32_t>> next;
     const auto take = [&](Known& known) {
@@ -239,13 +231,13 @@ void Packer::choose(const Waiting& waiting) {
             next.push({child.error, c});
         }
     };
-    CHECK_LE(waiting.frontier.size(), size_t(kNodeSlots));
-    for (const uint32_t record : waiting.frontier) {
-        Known& known = known_[record];
-        known.link = link(record);
+    CHECK_LE(frontier.size(), size_t(kNodeSlots));
+    for (const PackedSlot& slot : frontier) {
+        Known& known = known_[slot.record];
+        known.link = link(slot.record);
         take(known);
     }
-    for (size_t room = kNodeSlots - waiting.frontier.size(); room > 0 && !next.empty(); --room) {
+    for (size_t room = kNodeSlots - frontier.size(); room > 0 && !next.empty(); --room) {
         const uint32_t record = next.top().second;
         next.pop();
         take(known_.at(record));
@@ -254,18 +246,26 @@ void Packer::choose(const Waiting& waiting) {
 
 }  // namespace
 
-std::vector<PackedSlot> Packing::slots(NodeIndex node) const {
-    std::vector<PackedSlot> slots(row[node].operations);
-    slots_.read(begin_[node], std::as_writable_bytes(std::span(slots)));
-    return slots;
+PackedNode Packing::node(NodeIndex n) const {
+    Head head;
+    nodes_.read(n * kBytes, std::as_writable_bytes(std::span(&head, 1)));
+    PackedNode node{head.row, head.frontier, std::vector<PackedSlot>(head.slots)};
+    nodes_.read(n * kBytes + sizeof head, std::as_writable_bytes(std::span(node.slot)));
+    return node;
 }
 
-void Packing::append(std::span<const PackedSlot> slots) {
-    begin_.push_back(slots_.append(std::as_bytes(slots)));
+void Packing::put(NodeIndex n, const PackedNode& node) {
+    CHECK_LE(n, size_);
+    std::vector<std::byte> bytes(kBytes);
+    const Head head{node.row, node.frontier, uint32_t(node.slot.size())};
+    std::memcpy(bytes.data(), &head, sizeof head);
+    std::ranges::copy(std::as_bytes(std::span(node.slot)), bytes.begin() + sizeof head);
+    nodes_.write(n * kBytes, bytes);
+    size_ = std::max(size_, n + 1);
 }
 
-void packCollapses(const Collapses& collapses, Packing& packing) {
-    Packer(collapses, packing).run();
+void packCollapses(const Collapses& collapses, Packing& packing, const MakerSink& makes) {
+    Packer(collapses, packing, makes).run();
 }
 
 }  // namespace pietra::pmesh

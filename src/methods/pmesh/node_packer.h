@@ -10,14 +10,15 @@
 // The paper's estimate is multiplied by the number of nodes that the sides need at least, so that
 // cuts that leave less empty win: nodes are 96 to 99 % full.
 //
-// The result is a function of the collapses. n log kNodeSlots. Memory: four bytes a vertex, and
-// some hundreds a node; the slots lie in temporary space.
+// The result is a function of the collapses. n log kNodeSlots. Memory: O(base mesh); nodes, those
+// that wait with what is referred to in them, too, lie in temporary space.
 
+#include <functional>
 #include <span>
 #include <vector>
 
+#include "methods/pmesh/collapses.h"
 #include "methods/pmesh/operation_node.h"
-#include "methods/pmesh/recorder.h"
 
 namespace pietra::pmesh {
 
@@ -26,26 +27,38 @@ struct PackedSlot {
     uint32_t kinds;  ///< of both children, two bits each: none, in this node, in its child 0, in 1
 };
 
+struct PackedNode {
+    NodeRow row;  ///< parent, child, operations and level
+    uint32_t frontier = 0;
+    std::vector<PackedSlot> slot;
+};
+
 class Packing {
 public:
-    explicit Packing(TempSpace& space) : slots_(space) {}
+    explicit Packing(TempSpace& space) : nodes_(space) {}
 
-    std::vector<NodeRow> row;        ///< parent, child, operations and level
-    std::vector<uint32_t> frontier;  ///< one a node
-    /// One a vertex: the operation that makes it, or kNoOperation.
-    std::vector<OperationId> maker;
     /// One a base vertex: its first operation, or kNoOperation.
     std::vector<OperationId> base_operation;
 
-    std::vector<PackedSlot> slots(NodeIndex node) const;
-    void append(std::span<const PackedSlot> slots);
+    NodeIndex size() const { return size_; }
+    PackedNode node(NodeIndex n) const;
+    /// At the end, or in the place of another.
+    void put(NodeIndex n, const PackedNode& node);
 
 private:
-    Spill slots_;
-    std::vector<uint64_t> begin_;
+    struct Head {
+        NodeRow row;
+        uint32_t frontier, slots;
+    };
+    static constexpr uint64_t kBytes = sizeof(Head) + kNodeSlots * sizeof(PackedSlot);
+    Spill nodes_;
+    NodeIndex size_ = 0;
 };
 
+/// Told which operation makes a vertex, once for each that one makes.
+using MakerSink = std::function<void(VertexId, OperationId)>;
+
 /// Sets all of `packing`, which is empty.
-void packCollapses(const Collapses& collapses, Packing& packing);
+void packCollapses(const Collapses& collapses, Packing& packing, const MakerSink& makes);
 
 }  // namespace pietra::pmesh

@@ -89,6 +89,8 @@ TEST_P(EachForest, SurvivesItsCodec) {
 enum class Shape { kTree, kChain, kLoose };
 void makeCollapses(uint32_t count, Shape shape, Collapses& out) {
     std::vector<CollapseLink> links(count);
+    std::vector<uint32_t> numbers(count);
+    std::iota(numbers.begin(), numbers.end(), 0u);
     // Children lie before their parents.
     for (uint32_t i = 0; i < count; ++i) {
         CollapseLink& link = links[i];
@@ -105,10 +107,10 @@ void makeCollapses(uint32_t count, Shape shape, Collapses& out) {
             link.operations += links[c].operations;
             link.box.add(links[c].box);
         }
-        out.store.append(link, {});
+        const CollapseRecord record{};
+        out.store.append({&link, 1}, {&record, 1}, numbers);
         if (shape == Shape::kLoose || place == 0) out.base_last.push_back(i);
     }
-    out.vertices = count;
 }
 
 TEST(NodePacker, FillsWhateverTheShape) {
@@ -119,20 +121,21 @@ TEST(NodePacker, FillsWhateverTheShape) {
             Collapses collapses(space);
             makeCollapses(count, shape, collapses);
             Packing packing(space);
-            packCollapses(collapses, packing);
-            const std::set<OperationId> ids(packing.maker.begin(), packing.maker.end());
+            std::set<OperationId> ids;
+            packCollapses(collapses, packing, [&](VertexId, OperationId o) { ids.insert(o); });
             EXPECT_EQ(ids.size(), count);
             uint32_t sum = 0;
-            for (NodeIndex n = 0; n < packing.row.size(); ++n) {
-                const NodeRow& row = packing.row[n];
+            for (NodeIndex n = 0; n < packing.size(); ++n) {
+                const PackedNode node = packing.node(n);
+                const NodeRow& row = node.row;
                 EXPECT_LE(row.operations, kNodeSlots);
                 EXPECT_TRUE(row.operations > 0 || count == 0);
-                EXPECT_EQ(packing.slots(n).size(), row.operations);
+                EXPECT_EQ(node.slot.size(), row.operations);
                 EXPECT_TRUE(shape != Shape::kLoose || row.parent == kNoNode);
                 sum += row.operations;
             }
             EXPECT_EQ(sum, count);
-            EXPECT_LE(packing.row.size(), 1 + count / (kNodeSlots * 9 / 10)) << count;
+            EXPECT_LE(packing.size(), 1 + count / (kNodeSlots * 9 / 10)) << count;
         }
 }
 

@@ -80,7 +80,7 @@ float Recorder::precisionAt(const CollapseStep& step, uint32_t end) const {
 /// Adds what hangs below to the link, and makes it v's last.
 void Recorder::push(uint32_t v, CollapseLink link, CollapseRecord record) {
     link.box.add(record.position[0]);
-    if (link.u != kNoVertex) link.box.add(record.position[1]);
+    if (link.u != CollapseLink::kNone) link.box.add(record.position[1]);
     VertexHistory& h = history_[v];
     const auto addBelow = [&](const VertexHistory& below) {
         link.box.add(below.box);
@@ -88,7 +88,7 @@ void Recorder::push(uint32_t v, CollapseLink link, CollapseRecord record) {
         link.operations += below.operations;
     };
     addBelow(h);
-    if (link.u != kNoVertex) addBelow(history_[link.u]);
+    if (link.u != CollapseLink::kNone) addBelow(history_[link.u]);
     record.error = link.error;
     largest_ = std::max(largest_, uint32_t(record.height));
     h = {first_record_ + uint32_t(record_.size()), record.height, link.operations, link.error,
@@ -173,7 +173,7 @@ bool Recorder::take(const CollapseStep& step) {
     r.normal = {packNormal(normal_[v]), packNormal(normal_[u])};
     error_before_[v] = std::max(error_before_[v], error_before_[u]);
     normal_[v] = encodeNormal(decodeNormal(normal_[v]) + decodeNormal(normal_[u]));
-    push(v, {{history_[v].last, history_[u].last}, u, 1, step.deviation + error_before_[v], {}}, r);
+    push(v, {u, {history_[v].last, history_[u].last}, 1, step.deviation + error_before_[v], {}}, r);
     return true;
 }
 

@@ -14,7 +14,6 @@
 #include <span>
 #include <vector>
 
-#include "extmem/spill.h"
 #include "geometry/bounds.h"
 #include "methods/pmesh/operations.h"
 #include "simplify/collapse_sink.h"
@@ -23,17 +22,18 @@ namespace pietra::pmesh {
 
 inline constexpr uint32_t kNoVertex = ~0u;
 
-/// A collapse, as packing into nodes sees it. A dummy has no u.
+/// A collapse, as packing into nodes sees it.
 struct CollapseLink {
+    static constexpr uint64_t kNone = ~uint64_t(0);
+    uint64_t u = kNone;  ///< a vertex: by its place in the recorder's mesh; of a dummy none
     std::array<uint32_t, 2> child;  ///< the records that v and u came from, or kNoOperation
-    uint32_t u = kNoVertex;         ///< a vertex
     uint32_t operations = 1;        ///< it and all below
     float error = 0;                ///< lattice units, an estimate; no less than those below
     Box3i box;                      ///< of where it and all below bring vertices, in steps
 };
 
 /// The rest, as encoding sees it. Positions in steps, and as they were before the collapse.
-struct CollapseRecord {
+struct CollapseShape {
     std::array<Vec3i, 2> position;            ///< of v and of u
     std::array<uint16_t, 2> normal;           ///< the same
     float error;                              ///< as in the link
@@ -42,33 +42,11 @@ struct CollapseRecord {
     uint8_t left = kNoRank, right = kNoRank;  ///< of vl and vr, in the ring
     uint8_t ring_size = 0;                    ///< 0: a dummy
     bool closed = false;
+};
+struct CollapseRecord : CollapseShape {
     /// The neighbours of the merged vertex, counter-clockwise; where it is open, from the
     /// beginning.
     std::array<uint32_t, kMaxNeighbours> ring;
-};
-
-/// Collapses of a whole model, in temporary space.
-class CollapseStore {
-public:
-    explicit CollapseStore(TempSpace& space) : links_(space), records_(space) {}
-    void append(const CollapseLink& link, const CollapseRecord& record) {
-        links_.append(std::as_bytes(std::span(&link, 1)));
-        records_.append(std::as_bytes(std::span(&record, 1)));
-        ++size_;
-    }
-    uint32_t size() const { return size_; }
-    CollapseLink link(uint32_t i) const { return at<CollapseLink>(links_, i); }
-    CollapseRecord record(uint32_t i) const { return at<CollapseRecord>(records_, i); }
-
-private:
-    template <class T>
-    static T at(const Spill& spill, uint32_t i) {
-        T value;
-        spill.read(uint64_t(i) * sizeof(T), std::as_writable_bytes(std::span(&value, 1)));
-        return value;
-    }
-    Spill links_, records_;
-    uint32_t size_ = 0;
 };
 
 /// How the offsets of one operation's ends are stored.
@@ -112,10 +90,10 @@ public:
     uint64_t dummies() const { return dummies_; }
     /// Attempts, not edges: an edge may be tried again.
     const Refused& refused() const { return refused_; }
-    const VertexHistory& historyOf(uint32_t v) const { return history_[v]; }
-    OctNormal normalOf(uint32_t v) const { return normal_[v]; }
     /// Has all its triangles in this mesh. Known only once a collapse was offered; else false.
     bool isInside(uint32_t v) const { return !inside_.empty() && inside_[v]; }
+    const VertexHistory& historyOf(uint32_t v) const { return history_[v]; }
+    OctNormal normalOf(uint32_t v) const { return normal_[v]; }
 
 private:
     float precisionAt(const CollapseStep& step, uint32_t end) const;
@@ -137,19 +115,6 @@ private:
     uint32_t largest_ = 0;
     uint64_t dummies_ = 0;
     Refused refused_;
-};
-
-/// All that was collapsed, and what remains. Vertices are numbers of any kind, below `vertices`.
-struct Collapses {
-    explicit Collapses(TempSpace& space) : store(space) {}
-    CollapseStore store;
-    Mesh base;
-    std::vector<uint32_t> base_vertex;  ///< the number of each
-    std::vector<uint32_t> base_last;    ///< the record it came from last, or kNoOperation
-    size_t vertices = 0;
-    uint32_t largest_height = 0;
-    uint64_t dummies = 0;
-    Recorder::Refused refused;
 };
 
 }  // namespace pietra::pmesh

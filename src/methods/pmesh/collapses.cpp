@@ -1,0 +1,23 @@
+#include "methods/pmesh/collapses.h"
+
+namespace pietra::pmesh {
+
+void CollapseStore::append(std::span<const CollapseLink> links,
+                           std::span<const CollapseRecord> records,
+                           std::span<const uint32_t> number) {
+    std::vector<CollapseShape> shapes;
+    std::vector<uint32_t> rings;
+    for (const CollapseRecord& r : records) {
+        const uint32_t record = size_ + uint32_t(shapes.size());
+        shapes.push_back(r);
+        if (!r.closed) continue;
+        rings.insert(rings.end(), {record, r.ring_size});
+        for (uint8_t k = 0; k < r.ring_size; ++k) rings.push_back(number[r.ring[k]]);
+    }
+    links_.append(std::as_bytes(links));
+    shapes_.append(std::as_bytes(std::span(shapes)));
+    rings_.append(std::as_bytes(std::span(rings)));
+    size_ += uint32_t(records.size());
+}
+
+}  // namespace pietra::pmesh
