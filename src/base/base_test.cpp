@@ -81,7 +81,6 @@ TEST(WorkerPlacement, KeepsWorkersOffOneProcessor) {
     for (int round = 0; round < 1000 && workers == 0; ++round) {
         placement.update();
         parallelFor(64, [&](size_t) {
-            WorkerPlacement::enter();
             std::this_thread::sleep_for(std::chrono::microseconds(50));
             if (std::this_thread::get_id() == frame_thread) return;
             cpu_set_t mine;

@@ -1,6 +1,8 @@
 #pragma once
 // Parallel loops over oneTBB. Bodies must not depend on the order of execution; results that reach
 // a file are written in index order by the caller, so output is the same for any number of threads.
+// While somebody draws frames, workers of loops keep off the frame thread's processor
+// (worker_placement.h).
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/global_control.h>
@@ -10,6 +12,8 @@
 #include <cstddef>
 #include <optional>
 #include <vector>
+
+#include "base/worker_placement.h"
 
 namespace pietra {
 
@@ -29,6 +33,7 @@ void parallelFor(size_t count, Body&& body) {
     tbb::parallel_for(
         tbb::blocked_range<size_t>(0, count, 1),
         [&](const tbb::blocked_range<size_t>& range) {
+            WorkerPlacement::enter();
             for (size_t i = range.begin(); i < range.end(); ++i) body(i);
         },
         tbb::simple_partitioner());
@@ -39,7 +44,10 @@ template <class Body>
 void parallelForSlices(size_t count, size_t grain, Body&& body) {
     tbb::parallel_for(
         tbb::blocked_range<size_t>(0, count, grain),
-        [&](const tbb::blocked_range<size_t>& range) { body(range.begin(), range.end()); },
+        [&](const tbb::blocked_range<size_t>& range) {
+            WorkerPlacement::enter();
+            body(range.begin(), range.end());
+        },
         tbb::simple_partitioner());
 }
 

@@ -22,7 +22,7 @@ public:
     /// By the frame thread, at the beginning of each frame, for it may have been moved.
     void update();
 
-    /// By the bodies of a frame's parallel loops. Costs nothing where all is in place.
+    /// By the tasks of parallel loops (parallel.h does). Costs nothing where all is in place.
     static void enter() {
         if (const int cpu = frame_cpu_.load(std::memory_order_relaxed); cpu >= 0) keepOff(cpu);
     }

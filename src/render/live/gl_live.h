@@ -1,6 +1,7 @@
 #pragma once
 // Pictures of a scene by OpenGL, in a context of its own or in a window's.
 
+#include "base/worker_placement.h"
 #include "gpu/context.h"
 #include "render/gl/renderer.h"
 #include "render/live/live_renderer.h"
@@ -24,6 +25,7 @@ public:
     void present() { renderer_.present(); }
 
 private:
+    WorkerPlacement placement_;  // of those that adapt meshes
     GlContext context_;
     GlRenderer renderer_;
     Picture picture_;

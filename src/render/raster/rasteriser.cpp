@@ -8,7 +8,6 @@
 #include "base/check.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
-#include "base/worker_placement.h"
 #include "render/raster/batch.h"
 #include "render/raster/clip.h"
 #include "render/raster/coverage.h"
@@ -157,10 +156,7 @@ void Rasteriser::State::draw(std::span<const ModelPatches> models, bool leave_ou
 void Rasteriser::State::drawBatch(bool leave_out_hidden, bool is_all) {
     Stopwatch watch;
     layOutVertices();
-    parallelFor(batch.patch.size(), [&](size_t i) {
-        WorkerPlacement::enter();
-        transform(batch.patch[i]);
-    });
+    parallelFor(batch.patch.size(), [&](size_t i) { transform(batch.patch[i]); });
     const std::vector<DrawChunk> chunks = makeChunks();
     drawn.assign(batch.patch.size(), !leave_out_hidden);
     statistics.transform_ms += watch.lapMs();
@@ -300,7 +296,6 @@ void Rasteriser::State::drawTiles(const std::vector<DrawChunk>& chunks, bool lea
     std::atomic<uint64_t> covered{0};
     Stopwatch watch;
     const auto drawTile = [&](DrawTile& piece) {
-        WorkerPlacement::enter();
         Stopwatch tile_watch;
         const VisibilityTile tile = is_all ? ownTile(piece.box) : tileOfWhole(piece.box);
         if (leave_out_hidden)
