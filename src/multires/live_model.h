@@ -47,6 +47,7 @@ struct LiveTask {
     double pixels = 1;  ///< what shows as more is refined; 0: all is
     /// For adaption, about; some is always done.
     double milliseconds = std::numeric_limits<double>::infinity();
+    bool only_look = false;     ///< nothing is adapted; but what is needed is found
     size_t most_bytes = 0;      ///< at least what it holds
     size_t arriving_bytes = 0;  ///< beside these: of pages on their way, whose room is kept
     uint64_t most_triangles = std::numeric_limits<uint64_t>::max();

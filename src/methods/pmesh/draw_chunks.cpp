@@ -1,6 +1,7 @@
 #include "methods/pmesh/draw_chunks.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "base/parallel.h"
@@ -21,11 +22,59 @@ Vec3i drawnPosition(const Vertex& v, int shift) {
     return glm::clamp(v.position() * (1 << shift), -kOff, kLatticeMax + kOff - 1);
 }
 
+/// Where the vertices of a chunk are put: a table of its own, small enough for a cache, as one for
+/// all vertices of the mesh would be large, and one a thread.
+class Places {
+public:
+    /// kNone if v is new; then it must be set.
+    uint32_t& operator[](uint32_t v) {
+        size_t slot = v * 0x9e3779b1u >> (32 - kBits);
+        while (slot_[slot].place != kNone && slot_[slot].vertex != v)
+            slot = (slot + 1) % slot_.size();
+        slot_[slot].vertex = v;
+        return slot_[slot].place;
+    }
+    void clear() { slot_.fill({}); }
+
+private:
+    static constexpr int kBits = 13;
+    static_assert(3 * kMost < 1 << kBits);
+    struct Slot {
+        uint32_t vertex = 0, place = kNone;
+    };
+    std::array<Slot, 1 << kBits> slot_;
+};
+
 float distance(const Vec3f& a, const Vec3i& b) {
     return glm::length(a - Vec3f(b));
 }
 
+/// Without room for more, and without what it had once.
+template <class T>
+void resizeTight(std::vector<T>& elements, size_t count) {
+    if (elements.capacity() < count || elements.capacity() > count + count / 4) {
+        std::vector<T>().swap(elements);
+        elements.reserve(count);
+    }
+    elements.resize(count);
+}
+
+template <class T>
+size_t bytesOf(const std::vector<T>& elements) {
+    return elements.capacity() * sizeof(T);
+}
+
 }  // namespace
+
+size_t DrawChunks::bytes() const {
+    size_t bytes = bytesOf(chunk_) + bytesOf(face_) + bytesOf(slice_) + bytesOf(unused_);
+    for (const LiveChunk& chunk : chunk_)
+        bytes += bytesOf(chunk.mesh.position) + bytesOf(chunk.mesh.normal) +
+                 bytesOf(chunk.mesh.triangle);
+    for (const auto* lists : {&face_, &slice_})
+        for (const std::vector<uint32_t>& list : *lists) bytes += bytesOf(list);
+    return bytes;
+}
 
 void DrawChunks::update(ActiveMesh& mesh) {
     std::vector<uint8_t>& touched = mesh.chunk_touched;
@@ -48,7 +97,7 @@ void DrawChunks::update(ActiveMesh& mesh) {
     for (const uint32_t c : changed)
         if (chunk_[c].version == 0) unused_.push_back(c);
     std::fill(touched.begin(), touched.end(), 0);
-    for (const uint32_t c : changed) face_[c].clear();
+    for (const uint32_t c : changed) resizeTight(face_[c], 0);
 }
 
 /// The faces of what has changed, in their order.
@@ -62,8 +111,10 @@ void DrawChunks::list(const ActiveMesh& mesh) {
         for (size_t f = i * kSlice; f < end; ++f)
             if (mesh.chunk_touched[mesh.face[f].chunk()]) slice_[i].push_back(uint32_t(f));
     });
-    for (const auto& faces : slice_)
+    for (auto& faces : slice_) {
         for (const uint32_t f : faces) face_[mesh.face[f].chunk()].push_back(f);
+        resizeTight(faces, 0);
+    }
 }
 
 /// To the first one that it borders on and that has room for it. False if there is none.
@@ -116,28 +167,32 @@ uint32_t DrawChunks::cut(ActiveMesh& mesh, uint32_t chunk) {
 }
 
 void DrawChunks::make(const ActiveMesh& mesh, uint32_t index) {
-    thread_local std::vector<uint32_t> place, used;
-    if (place.size() < mesh.vertexCount()) place.resize(mesh.vertexCount(), kNone);
+    thread_local Places places;
+    thread_local std::vector<uint32_t> used;
+    places.clear();
     const int shift = mesh.source().lattice.shift;
     LiveChunk& chunk = chunk_[index];
-    chunk.mesh.clear();
     chunk.version = face_[index].empty() ? 0 : version_;
     used.clear();
-    Box3i box;
-    for (const uint32_t f : face_[index]) {
-        Triangle t;
+    resizeTight(chunk.mesh.triangle, face_[index].size());
+    for (size_t i = 0; i < face_[index].size(); ++i)
         for (size_t k = 0; k < 3; ++k) {
-            const uint32_t v = mesh.face[f].vertex[k];
-            if (place[v] == kNone) {
-                place[v] = uint32_t(used.size());
+            const uint32_t v = mesh.face[face_[index][i]].vertex[k];
+            uint32_t& place = places[v];
+            if (place == kNone) {
+                place = uint32_t(used.size());
                 used.push_back(v);
-                chunk.mesh.position.push_back(drawnPosition(mesh.vertex[v], shift));
-                chunk.mesh.normal.push_back(unpackNormal(mesh.vertex[v].normal));
-                box.add(chunk.mesh.position.back());
             }
-            t[k] = place[v];
+            chunk.mesh.triangle[i][k] = place;
         }
-        chunk.mesh.triangle.push_back(t);
+    resizeTight(chunk.mesh.position, used.size());
+    resizeTight(chunk.mesh.normal, used.size());
+    Box3i box;
+    for (size_t i = 0; i < used.size(); ++i) {
+        const Vertex& v = mesh.vertex[used[i]];
+        chunk.mesh.position[i] = drawnPosition(v, shift);
+        chunk.mesh.normal[i] = unpackNormal(v.normal);
+        box.add(chunk.mesh.position[i]);
     }
     const Vec3f centre = 0.5f * (Vec3f(box.min) + Vec3f(box.max));
     uint32_t error = 0;
@@ -149,7 +204,6 @@ void DrawChunks::make(const ActiveMesh& mesh, uint32_t index) {
         const auto radius = float(decodeRadius(c.split_radius) << shift);
         chunk.saturated.radius = std::max(chunk.saturated.radius, away + radius);
         error = std::max<uint32_t>(error, c.split_error);
-        place[used[i]] = kNone;
     }
     chunk.error = float(double(decodeError(error)) * kErrorUnit * double(1 << shift));
     constexpr uint32_t kCodesAnOctave = 8;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/give_back.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
 #include "methods/pmesh/adaption.h"
@@ -55,12 +56,21 @@ NodeForest openRoots(const ModelReader& reader) {
     return forest;
 }
 
+/// With the triangles that a mesh has beyond two a vertex, which it keeps.
+size_t bytesOfBase(const ProgressiveMesh& mesh) {
+    const size_t vertices = mesh.base_vertex.size(), triangles = mesh.base_triangle.size();
+    return vertices * (sizeof(Vertex) + sizeof(OperationId)) + triangles * sizeof(Triangle) +
+           2 * sizeof(ActiveFace) * (triangles - std::min(triangles, 2 * vertices));
+}
+
 class LiveMesh : public LiveModel {
 public:
     explicit LiveMesh(const ModelReader& reader)
         : rows_(rowsOf(reader.nodes(), reader.info().lattice.shift)),
           nodes_(openRoots(reader), uint32_t(rows_.size())),
-          adaption_(nodes_.mesh(), &nodes_) {
+          adaption_(nodes_.mesh(), &nodes_),
+          base_bytes_(bytesOfBase(nodes_.mesh())),
+          most_vertices_(adaption_.mesh().vertexCount()) {
         chunks_.update(adaption_.mesh());
     }
 
@@ -77,14 +87,20 @@ public:
     std::vector<uint32_t> prefetch(const View& view, double pixels, size_t most) override {
         return nodes_.prefetch(criterionFor(view, lattice(), pixels), most);
     }
-    size_t bytes() const override { return nodes_.loaded() * kNodeBytes + meshBytes(); }
+    size_t bytes() const override { return nodes_.bytes() + meshBytes(); }
     size_t pageBytes() const override { return kNodeBytes; }
     size_t release(size_t bytes) override;
     std::span<const std::string> faults() const override { return faults_; }
 
 private:
     const Lattice& lattice() const { return nodes_.mesh().lattice; }
-    size_t meshBytes() const { return adaption_.mesh().vertexCount() * kVertexBytes; }
+    size_t meshBytes() const {
+        return base_bytes_ + most_vertices_ * (kActiveBytes + kSortingBytes) + chunks_.bytes();
+    }
+    size_t roomFor(size_t bytes) const;
+    uint64_t drawable(uint64_t triangles) const;
+    void describe(const LiveTask& task, const PassCounts& counts, bool drawn_limits);
+    void giveBack();
     double largestError(const View& view) const;
     void tell(const std::string& what);
 
@@ -92,6 +108,8 @@ private:
     ResidentNodes nodes_;
     Adaption adaption_;
     DrawChunks chunks_;
+    const size_t base_bytes_;
+    size_t most_vertices_;  // at a time, since giveBack()
     double chunks_ms_ = 0;  // of the last frame
     LiveFrame frame_;
     std::vector<std::string> faults_;
@@ -104,48 +122,78 @@ bool LiveMesh::arrive(uint32_t page, const LivePage* decoded) {
     return false;
 }
 
+/// How many vertices memory has room for.
+size_t LiveMesh::roomFor(size_t bytes) const {
+    const size_t vertices = adaption_.mesh().vertexCount();
+    const size_t chunks = chunks_.bytes();
+    const size_t others =
+        nodes_.bytes() + base_bytes_ + chunks - std::min(chunks, vertices * kChunkBytes);
+    return (bytes - std::min(bytes, others)) / kVertexBytes;
+}
+
+/// A vertex more is two triangles more, at most.
+uint64_t LiveMesh::drawable(uint64_t triangles) const {
+    const ProgressiveMesh& mesh = nodes_.mesh();
+    const uint64_t base = mesh.base_triangle.size();
+    return mesh.base_vertex.size() + (std::max(triangles, base) - base) / 2;
+}
+
 const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
     const Criterion criterion = criterionFor(*task.view, lattice(), task.pixels);
     FrameLimits limits;
     // Where much changes, chunks take a part of the time.
     limits.milliseconds = std::max(task.milliseconds - chunks_ms_, task.milliseconds / 4);
-    limits.operations = kPassOperations;
-    limits.passes = kMostPasses;
-    const size_t node_bytes = nodes_.loaded() * kNodeBytes;
-    // A vertex more is two triangles more, at most.
-    const ProgressiveMesh& mesh = nodes_.mesh();
-    const uint64_t base = mesh.base_triangle.size();
-    const size_t in_memory =
-        (task.most_bytes - std::min(task.most_bytes, node_bytes)) / kVertexBytes;
-    const uint64_t drawable =
-        mesh.base_vertex.size() + (std::max(task.most_triangles, base) - base) / 2;
-    limits.vertices = std::min<uint64_t>(in_memory, drawable);
+    limits.operations = task.only_look ? 0 : kPassOperations;
+    limits.passes = task.only_look ? 1 : kMostPasses;
+    const size_t in_memory = roomFor(task.most_bytes), in_picture = drawable(task.most_triangles);
+    limits.vertices = std::min(in_memory, in_picture);
+    const size_t vertices = adaption_.mesh().vertexCount();
     const PassCounts counts = adaption_.frame(criterion, limits);
+    most_vertices_ = std::max({most_vertices_, adaption_.mesh().vertexCount(),
+                               std::min<size_t>(limits.vertices, vertices + counts.splits)});
     nodes_.note(adaption_);
-    nodes_.setMost(
-        (task.most_bytes + task.arriving_bytes - std::min(task.most_bytes, meshBytes())) /
-        kNodeBytes);
+    const size_t node_room = task.most_bytes - std::min(task.most_bytes, meshBytes());
+    nodes_.setMost((node_room + task.arriving_bytes) / kNodeBytes);
     const Stopwatch watch;
     chunks_.update(adaption_.mesh());
     chunks_ms_ = watch.ms();
 
+    describe(task, counts, in_picture <= in_memory);
+    if (frame_.short_of_memory) nodes_.evictOldest();
+    const size_t left = nodes_.bytes() - nodes_.loaded() * kNodeBytes +
+                        (most_vertices_ - adaption_.mesh().vertexCount()) * kActiveBytes;
+    if (frame_.short_of_memory || left > bytes() / 4) giveBack();
+    return frame_;
+}
+
+void LiveMesh::describe(const LiveTask& task, const PassCounts& counts, bool drawn_limits) {
     frame_.operations = counts.operations();
-    frame_.busy = !counts.finished;
-    frame_.missing = nodes_.requests(~size_t(0)).size();
+    const bool is_done = counts.finished && !counts.short_of_room && adaption_.waiting().empty();
+    frame_.busy = !counts.finished || (task.only_look && !is_done);
+    frame_.missing = nodes_.missing();
     // What is needed is counted only where it may be too much.
     frame_.needed_bytes = bytes() + frame_.missing * kNodeBytes;
     if (frame_.needed_bytes > task.most_bytes / 2)
         frame_.needed_bytes = nodes_.required() * kNodeBytes + meshBytes();
     frame_.triangles = adaption_.mesh().faceCount();
     const bool is_short = counts.finished && counts.short_of_room;
-    frame_.short_of_triangles = is_short && drawable <= in_memory;
-    frame_.short_of_memory = (is_short && in_memory < drawable) ||
-                             (counts.finished && frame_.needed_bytes > task.most_bytes);
-    if (frame_.short_of_memory) nodes_.evictOldest();
-    const bool is_done = counts.finished && !counts.short_of_room && adaption_.waiting().empty();
+    frame_.short_of_triangles = is_short && drawn_limits;
+    frame_.short_of_memory =
+        (is_short && !drawn_limits) || (counts.finished && frame_.needed_bytes > task.most_bytes);
     frame_.largest_px = is_done ? task.pixels : largestError(*task.view);
     if (adaption_.refused() > 0) tell("operations do not fit their places");
-    return frame_;
+}
+
+/// What nodes and vertices took that are no more.
+void LiveMesh::giveBack() {
+    ActiveMesh& mesh = adaption_.mesh();
+    nodes_.giveBack();
+    giveBackBehind(mesh.vertex);
+    giveBackBehind(mesh.pulse);
+    giveBackBehind(mesh.criteria);
+    giveBackBehind(mesh.record);
+    giveBackBehind(mesh.face);
+    most_vertices_ = mesh.vertexCount();
 }
 
 /// Once.
@@ -177,9 +225,10 @@ double LiveMesh::largestError(const View& view) const {
 }
 
 size_t LiveMesh::release(size_t bytes) {
-    size_t released = 0;
-    while (released < bytes && nodes_.evictOldest()) released += kNodeBytes;
-    return released;
+    const size_t before = this->bytes();
+    giveBack();
+    while (this->bytes() + bytes > before && nodes_.evictOldest()) nodes_.giveBack();
+    return before - this->bytes();
 }
 
 }  // namespace

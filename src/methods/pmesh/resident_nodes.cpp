@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/give_back.h"
 #include "base/parallel.h"
 
 namespace pietra::pmesh {
@@ -101,7 +102,7 @@ std::vector<NodeIndex> ResidentNodes::requests(size_t most) const {
 
 std::vector<NodeIndex> ResidentNodes::prefetch(const Criterion& criterion, size_t most) {
     std::vector<NodeIndex> nodes;
-    size_t room = most_ - std::min<size_t>(most_, loaded_);
+    size_t room = most_ - std::min<size_t>(most_, loaded());
     for (NodeIndex n = 0; n < row_.size(); ++n)
         room += isLoaded(n) && state_[n].last_used + kFramesKept < frame_;
     std::vector<uint8_t> is_there(row_.size());
@@ -136,13 +137,8 @@ bool ResidentNodes::evictOldest() {
 }
 
 bool ResidentNodes::makeRoom() {
-    while (loaded_ >= most_)
+    while (loaded() >= most_)
         if (!evictOldest()) return false;
-    if (free_place_.empty()) {
-        free_place_.push_back(uint32_t(reference_level_.size()));
-        reference_level_.emplace_back();
-        mesh_.operation.resize(reference_level_.size() * kNodeSlots);
-    }
     return true;
 }
 
@@ -155,17 +151,18 @@ bool ResidentNodes::arrive(NodeIndex index, const OperationNode& node) {
         if (levels.size() != node.frontier) return giveUp(index), false;
     }
     if (!makeRoom()) return false;
-    const uint32_t place = free_place_.back();
-    free_place_.pop_back();
+    const auto place = uint32_t(loaded());
     mesh_.place_of_node[index] = place;
+    mesh_.operation.resize(size_t(place + 1) * kNodeSlots);
     for (size_t s = 0; s < node.operation.size(); ++s)
         mesh_.operation[size_t(place) * kNodeSlots + s] =
             toOperation(index, row_[index], node.operation[s]);
-    reference_level_[place] = node.reference_level;
+    reference_level_.push_back(node.reference_level);
+    node_at_.push_back(index);
+    most_at_a_time_ = std::max(most_at_a_time_, loaded());
     if (parent != kNoNode) ++state_[parent].loaded_children;
     state_[index].asked = 0;
     state_[index].last_used = frame_;
-    ++loaded_;
     return true;
 }
 
@@ -173,11 +170,25 @@ bool ResidentNodes::evict(NodeIndex index) {
     pin();
     State& s = state_[index];
     if (!isLoaded(index) || s.is_pinned || s.loaded_children > 0) return false;
-    free_place_.push_back(mesh_.place_of_node[index]);
+    const uint32_t place = mesh_.place_of_node[index];
+    if (const size_t last = loaded() - 1; place != last) {
+        std::copy_n(&mesh_.operation[last * kNodeSlots], kNodeSlots,
+                    &mesh_.operation[size_t(place) * kNodeSlots]);
+        std::swap(reference_level_[place], reference_level_[last]);
+        node_at_[place] = node_at_[last];
+        mesh_.place_of_node[node_at_[place]] = place;
+    }
+    node_at_.pop_back();
+    reference_level_.pop_back();
+    mesh_.operation.resize(loaded() * kNodeSlots);
     mesh_.place_of_node[index] = ProgressiveMesh::kNotLoaded;
     --state_[row_[index].parent].loaded_children;
-    --loaded_;
     return true;
+}
+
+void ResidentNodes::giveBack() {
+    giveBackBehind(mesh_.operation);
+    most_at_a_time_ = loaded();
 }
 
 }  // namespace pietra::pmesh

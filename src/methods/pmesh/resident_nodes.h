@@ -16,8 +16,8 @@
 //   - A node that is damaged, or does not fit its parent, is never asked for again, nor what is
 //     below it.
 //
-// Deterministic in the order of calls. Memory: kNodeBytes for each node there has been at a time,
-// 50 bytes a node of the file. Not thread-safe.
+// Deterministic in the order of calls. Memory: bytes(), and 50 bytes a node of the file. Nodes lie
+// without gaps: where one leaves, the last one takes its place. Not thread-safe.
 
 #include <optional>
 #include <span>
@@ -67,8 +67,14 @@ public:
     bool isLoaded(NodeIndex n) const {
         return mesh_.place_of_node[n] != ProgressiveMesh::kNotLoaded;
     }
-    size_t loaded() const { return loaded_; }
-    size_t required();  ///< in use or asked for, by the last frame
+    size_t loaded() const { return node_at_.size(); }
+    size_t required();                                ///< in use or asked for, by the last frame
+    size_t missing() const { return asked_.size(); }  ///< asked for by the last frame
+
+    /// What nodes take, those included that have left since the last giveBack().
+    size_t bytes() const { return most_at_a_time_ * kNodeBytes; }
+    /// Gives the memory of those that have left to the system.
+    void giveBack();
 
 private:
     struct State {
@@ -91,13 +97,13 @@ private:
     std::vector<NodeRow> row_;
     std::vector<State> state_;
     std::vector<std::array<std::vector<uint16_t>, 2>> reference_level_;  // a place
-    std::vector<uint32_t> free_place_;
+    std::vector<NodeIndex> node_at_;                                     ///< the same
     std::vector<NodeIndex> asked_;
     std::optional<std::vector<NodeIndex>> victims_;  // of this frame, the last one first
     uint32_t most_;
     uint32_t frame_ = 0;
     const ActiveMesh* unpinned_ = nullptr;  ///< the frame's, whose nodes are not pinned yet
-    size_t loaded_ = 0;
+    size_t most_at_a_time_ = 0;
 };
 
 }  // namespace pietra::pmesh
