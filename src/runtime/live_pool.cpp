@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "runtime/live_settle.h"
 
@@ -37,7 +38,9 @@ void LivePool::publish() {
         for (size_t i = 0; i < count; ++i)
             if (!is_there[i]) is_there[i] = arrive(arriving[i]);
     // What has no room now is asked for again, if it is still needed.
-    ready_.erase(ready_.begin(), ready_.begin() + ptrdiff_t(count));
+    const auto rest = ready_.begin() + ptrdiff_t(count);
+    std::move(ready_.begin(), rest, std::back_inserter(dropped_));
+    ready_.erase(ready_.begin(), rest);
 }
 
 bool LivePool::arrive(LoadedPage& page) {
@@ -105,8 +108,7 @@ void LivePool::load(size_t free_bytes) {
         want(i, parts_[i].model->requests(std::max<size_t>(kMostWanted / parts_.size(), 1)), true);
     for (const int which : {0, 1})
         for (uint32_t i = 0; i < parts_.size(); ++i) want(i, parts_[i].ahead[which], false);
-    std::vector<std::vector<Mesh>> none;
-    loader_->want(wanted_, none);
+    loader_->want(wanted_, dropped_);
 }
 
 void LivePool::prefetch(size_t i, const View& view, double pixels, bool next_level) {
@@ -129,6 +131,13 @@ size_t LivePool::neededBytes() const {
     size_t bytes = 0;
     for (const Part& part : parts_) bytes += part.frame.needed_bytes;
     return bytes;
+}
+
+size_t LivePool::lackingBytes() const {
+    size_t bytes = 0;
+    for (const Part& part : parts_)
+        bytes += std::min(part.frame.missing, kMostWanted) * part.model->pageBytes();
+    return bytes - std::min(bytes, pageBytes(begun_) + pageBytes(wanted_));
 }
 
 size_t LivePool::missing() const {

@@ -35,6 +35,8 @@ public:
     /// What they hold, pages on their way included.
     size_t bytes() const;
     size_t neededBytes() const;
+    /// Of pages that load() will send for, about, beyond those that are on their way.
+    size_t lackingBytes() const;
     /// Pages needed and under way, and models that had no time to do all they could.
     size_t missing() const;
     bool shortOfMemory() const;
@@ -65,7 +67,7 @@ private:
     void forAllUnderWay(const Body& body) const;
 
     std::vector<Part> parts_;
-    std::vector<LoadedPage> ready_;
+    std::vector<LoadedPage> ready_, dropped_;  // these to be freed by the loader
     std::vector<PageKey> begun_, wanted_;
     size_t free_bytes_ = 0;  // while wanting
     bool no_room_ = false;   // for something needed

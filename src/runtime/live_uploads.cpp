@@ -23,12 +23,20 @@ uint64_t LiveUploads::mostTriangles(uint32_t i) const {
     return uint64_t(kUsable * double(own + free) / kTriangleBytes);
 }
 
+bool LiveUploads::beginFrame() {
+    if (sink_ == nullptr) return true;
+    ahead_bytes_ -= std::min(ahead_bytes_, kFrameBytes);
+    if (ahead_bytes_ > 0 || !sink_->mayUpload(std::min(last_bytes_, kFrameBytes))) return false;
+    last_bytes_ = 0;
+    return true;
+}
+
 bool LiveUploads::upload(uint32_t i, uint32_t chunk, const LiveChunk& from) {
     const size_t before = sink_->usedBytes();
     if (!sink_->upload({first_model_ + i, chunk}, {&from.mesh, 1})) return false;
     models_[i].version[chunk] = from.version;
-    models_[i].bytes += sink_->usedBytes() - before;
-    bytes_ += sink_->usedBytes() - before;
+    const size_t bytes = sink_->usedBytes() - before;
+    for (size_t* sum : {&models_[i].bytes, &bytes_, &last_bytes_, &ahead_bytes_}) *sum += bytes;
     return true;
 }
 

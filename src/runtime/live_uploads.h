@@ -2,6 +2,9 @@
 // Chunks of adapted meshes in a renderer's own memory (multires/page_sink.h), where they are copied
 // anew when they have changed. Pages are those of models from a first number on, a chunk each.
 //
+// A mesh is copied as a whole or not at all: of all that has changed, or there would be cracks. So
+// where frames copy too much, or copying would wait, meshes stay as they are for some frames.
+//
 // Sinks may have room, but not in one piece: then all chunks are taken out and copied again, side
 // by side. Whoever adapts meshes keeps them so small that this does: mostTriangles().
 
@@ -25,6 +28,11 @@ public:
     LiveUploads(const LiveUploads&) = delete;
     LiveUploads& operator=(const LiveUploads&) = delete;
 
+    /// Once a frame: whether what is adapted in it may be copied. A frame copies kFrameBytes on
+    /// average.
+    [[nodiscard]] bool beginFrame();
+    static constexpr size_t kFrameBytes = size_t(4) << 20;
+
     /// What chunks there take now.
     size_t bytes() const { return bytes_; }
     /// Of model i, if others stay as they are.
@@ -46,6 +54,8 @@ private:
     const uint32_t first_model_;
     std::vector<Model> models_;
     size_t bytes_ = 0;
+    size_t last_bytes_ = 0;   // copied by the last frame that did
+    size_t ahead_bytes_ = 0;  // copied, of what frames to come may
 };
 
 }  // namespace pietra

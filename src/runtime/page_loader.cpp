@@ -44,7 +44,7 @@ std::optional<std::vector<PageKey>> PageLoader::forget() {
     return begun_;
 }
 
-void PageLoader::want(std::span<const PageKey> wanted, std::vector<std::vector<Mesh>>& dropped) {
+void PageLoader::want(std::span<const PageKey> wanted, std::vector<LoadedPage>& dropped) {
     if (wanted.empty() && dropped.empty()) return;
     {
         const std::unique_lock lock(mutex_, std::try_to_lock);
@@ -65,10 +65,10 @@ void PageLoader::take(std::vector<LoadedPage>& pages) {
     ready_.clear();
 }
 
-/// The next page to load; or none, after having freed meshes. False if there is nothing more to do,
+/// The next page to load; or none, after having freed some. False if there is nothing more to do,
 /// ever.
 bool PageLoader::next(std::optional<PageKey>& key, std::vector<PageKey>& upcoming) {
-    std::vector<std::vector<Mesh>> dropped;
+    std::vector<LoadedPage> dropped;
     std::unique_lock lock(mutex_);
     wake_.wait(lock, [&] { return stop_ || !queue_.empty() || !dropped_.empty(); });
     if (stop_) return false;

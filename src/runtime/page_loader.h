@@ -8,7 +8,7 @@
 //
 // The frame thread never waits for a lock that a loader's thread may hold: that one runs in the
 // background, and may have lost its core for milliseconds. What is asked for then does not happen,
-// and is asked for again in the next frame. Likewise it frees no meshes, as the allocator has locks
+// and is asked for again in the next frame. Likewise it frees no pages, as the allocator has locks
 // too: it leaves that to these threads.
 
 #include <atomic>
@@ -54,9 +54,9 @@ public:
     /// Forgets what no thread has begun. Returns the pages that threads have begun and nobody has
     /// taken; there will be no more of them before want(). Nothing: not possible now.
     std::optional<std::vector<PageKey>> forget();
-    /// After forget(): pages to load, best first, none of them begun. And meshes to free, before
+    /// After forget(): pages to load, best first, none of them begun. And some to free, before
     /// anything is loaded; they are still there if that is not possible now.
-    void want(std::span<const PageKey> wanted, std::vector<std::vector<Mesh>>& dropped);
+    void want(std::span<const PageKey> wanted, std::vector<LoadedPage>& dropped);
     /// Appends what is ready, in the order in which it became so.
     void take(std::vector<LoadedPage>& pages);
     /// Bytes read from files so far.
@@ -75,7 +75,7 @@ private:
     std::vector<PageKey> begun_;   // until taken
     std::deque<PageKey> advised_;  // that the system was told of last
     std::vector<LoadedPage> ready_;
-    std::vector<std::vector<Mesh>> dropped_;
+    std::vector<LoadedPage> dropped_;
     std::atomic<uint64_t> bytes_read_{0};
     bool stop_ = false;
     std::vector<std::thread> threads_;

@@ -163,6 +163,7 @@ void PagePool::load() {
     }
     forgetUnwanted();
     reserve(*begun);
+    short_of_ram_ = false;
     blocked_ = scattered_bytes_ > 0 && !makeRoomToDraw(scattered_bytes_, Need::kDraw);
     for (const Wanted& wanted : wanted_) {
         missing_ += wanted.need != Need::kLater;
@@ -202,10 +203,11 @@ bool PagePool::provide(const Wanted& wanted, std::vector<PageKey>& to_load) {
     SceneModel& model = modelOf(key);
     const bool to_device = sink_ != nullptr && !model.residency.resident(key.page);
     const bool copied = model.hasCopy(key.page);
-    if (!copied && !makeRoomInRam(model.copy_bytes[key.page], wanted.need)) {
+    const size_t kept_free = wanted.need == Need::kLater ? needed_elsewhere_ : 0;
+    if (!copied && !makeRoomInRam(model.copy_bytes[key.page] + kept_free, wanted.need)) {
         // Copies that are on their way to the sink will make room.
         const bool for_ever = sink_ == nullptr || (ram_.reserved == 0 && arriving_.empty());
-        blocked_ = wanted.need == Need::kDraw && for_ever;
+        blocked_ = short_of_ram_ = wanted.need == Need::kDraw && for_ever;
         missing_ -= wanted.need == Need::kEye;
         return wanted.need == Need::kEye;
     }
@@ -287,7 +289,7 @@ void PagePool::leave(const PageKey& key) {
 void PagePool::dropCopy(const PageKey& key) {
     SceneModel& model = modelOf(key);
     if (model.arriving[key.page] != 0) return;
-    dropped_.push_back(std::exchange(model.copies[key.page], {}));
+    dropped_.push_back({key, std::exchange(model.copies[key.page], {}), {}, {}});
     ram_.used -= model.copy_bytes[key.page];
 }
 

@@ -41,8 +41,12 @@ public:
     /// Has the loader load what fits, after making room.
     void load();
 
-    /// What others hold of the memory, in RAM. These say so in each frame, before load().
-    void setElsewhere(size_t bytes) { ram_.elsewhere = bytes; }
+    /// What others hold of the memory, in RAM, and will need before pages that are wanted for later
+    /// get any. These say so in each frame, before load().
+    void setElsewhere(size_t bytes, size_t needed = 0) {
+        ram_.elsewhere = bytes;
+        needed_elsewhere_ = needed;
+    }
     /// For them: lets go of so many bytes that this frame does not need, or fewer. Of how many?
     size_t release(size_t bytes);
     /// The same, in the sink.
@@ -50,6 +54,8 @@ public:
 
     /// Something that is to be drawn does not fit.
     bool blocked() const { return blocked_; }
+    /// ... into RAM; else into the sink.
+    bool blockedInRam() const { return blocked_ && short_of_ram_; }
     /// Of what is wanted in this frame, not for later, how much is on its way or does not fit.
     size_t missing() const { return missing_; }
     /// Whether so many bytes may stay in RAM, beside what passes through.
@@ -91,9 +97,10 @@ private:
     std::vector<Wanted> wanted_;
     std::vector<LoadedPage> loaded_;
     std::vector<PageKey> arriving_;
-    std::vector<std::vector<Mesh>> dropped_;  // evicted, to be freed by the loader
-    size_t scattered_bytes_ = 0;  ///< that the sink has free, about, but not in one piece
-    bool blocked_ = false;
+    std::vector<LoadedPage> dropped_;  // evicted, to be freed by the loader
+    size_t scattered_bytes_ = 0;       ///< that the sink has free, about, but not in one piece
+    bool blocked_ = false, short_of_ram_ = false;
+    size_t needed_elsewhere_ = 0;
     size_t missing_ = 0;
     std::vector<std::string> faults_;
     std::unique_ptr<PageLoader> loader_;  // last: its threads end first

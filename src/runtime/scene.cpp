@@ -109,7 +109,7 @@ private:
     const size_t table_bytes_;
     PagePool pages_;
     LiveUploads uploads_;
-    bool uploads_fit_ = true;
+    bool uploads_fit_ = true, may_upload_ = true;
     std::vector<Part> parts_;
     const double adapt_ms_;
     std::vector<Missing> missing_;
@@ -149,7 +149,7 @@ const Frame& Scene::Impl::update(const FrameRequest& request) {
     // What others let go of is for what is needed, then.
     const bool is_short = pages_.blocked() || live_.shortOfMemory();
     request.prefetch && !is_short ? prefetch(request) : live_.forgetPrefetch();
-    pages_.setElsewhere(live_.bytes());
+    pages_.setElsewhere(live_.bytes(), live_.lackingBytes());
     pages_.load();
     live_.load(pages_.freeRam());
     const size_t missing = pages_.missing() + live_.missing();
@@ -170,7 +170,7 @@ const Frame& Scene::Impl::update(const FrameRequest& request) {
 
 /// Something needed does not fit, and nobody has anything that is not needed.
 bool Scene::Impl::isBlocked() {
-    if (pages_.blocked()) return live_.release(kReleasedBytes) == 0;
+    if (pages_.blocked()) return !pages_.blockedInRam() || live_.release(kReleasedBytes) == 0;
     if ((live_.shortOfTriangles() || !uploads_fit_) && pages_.releaseDevice(kReleasedBytes) == 0)
         return true;
     return live_.shortOfMemory() &&
@@ -225,19 +225,25 @@ void Scene::Impl::select(uint32_t m, const FrameRequest& request, ModelFrame& ou
 
 void Scene::Impl::adapt(uint32_t i, const FrameRequest& request, ModelFrame& out) {
     const Stopwatch watch;
-    pages_.setElsewhere(live_.bytes());
+    const auto adaptNow = [&](const LiveTask& task) -> const LiveFrame& {
+        pages_.setElsewhere(live_.bytes());
+        return live_.adapt(i, task, pages_.freeRam());
+    };
+    if (i == 0) may_upload_ = uploads_.beginFrame();
     LiveTask task{.view = &out.view,
                   .pixels = request.pixels * tolerance_.factor(),
                   .milliseconds = adapt_ms_ / double(live_.size()),
+                  .only_look = !may_upload_,
                   .most_triangles = uploads_.mostTriangles(i)};
-    const LiveFrame& live = live_.adapt(i, task, pages_.freeRam());
+    const LiveFrame& live = adaptNow(task);
     if (i == 0) uploads_fit_ = true;
     // No frame has a hole, if it takes time.
     while (!uploads_.update(i, live_.model(i).chunks()) && task.pixels < kCoarsest) {
         uploads_fit_ = false;
         task.pixels = 4 * std::max(task.pixels, 1.0);
         task.milliseconds = std::numeric_limits<double>::infinity();
-        (void)live_.adapt(i, task, pages_.freeRam());
+        task.only_look = false;
+        (void)adaptNow(task);
     }
     frame_.adapt_ms += watch.ms();
     frame_.tolerance_px = std::max(frame_.tolerance_px, live.largest_px);

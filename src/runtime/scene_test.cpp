@@ -9,6 +9,7 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "base/scratch_directory.h"
+#include "runtime/page_pool.h"
 #include "store/terrain_model.h"
 
 namespace pietra {
@@ -276,6 +277,25 @@ TEST_F(SceneTest, tooSmallABudgetRaisesTheToleranceAndStaysWithinIt) {
     // With room again it comes down to what is asked for.
     request.pixels = 64;
     EXPECT_TRUE(scene.converge(request).converged);
+}
+
+TEST_F(SceneTest, pagesForLaterLeaveWhatOthersNeedNow) {
+    const ModelReader reader(path_);
+    SceneModels models;
+    models.push_back(std::make_unique<SceneModel>(reader));
+    const size_t ram = sizeOfAll(reader);
+    PagePool pool(models, ram, 0, 1, nullptr);
+    const size_t least = pool.ramBytes();
+    for (uint32_t frame = 100; frame < 102; ++frame) {
+        pool.publish(frame);
+        for (PageIndex page = 0; page < reader.pageCount(); ++page)
+            if (!models[0]->hasCopy(page)) pool.want({0, page}, Need::kLater);
+        pool.setElsewhere(0, frame == 100 ? ram - least : (ram - least) / 2);
+        pool.load();
+        EXPECT_EQ(pool.ramBytes() > least, frame > 100);
+        EXPECT_EQ(pool.missing(), 0u);
+    }
+    EXPECT_LE(pool.ramBytes() - least, (ram - least) / 2);
 }
 
 TEST_F(SceneTest, saysHowMuchTheRootsNeed) {

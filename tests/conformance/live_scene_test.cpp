@@ -1,6 +1,8 @@
 // Models whose pages are not patches, as they are looked at: for every method that has them.
 
 #include <gtest/gtest.h>
+#include <malloc.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -18,6 +20,7 @@
 #include "render/offline/offline_picture.h"
 #include "render/raster/rasteriser.h"
 #include "runtime/live_settle.h"
+#include "runtime/live_uploads.h"
 #include "runtime/scene.h"
 #include "store/model_reader.h"
 #include "tests/conformance/meshes.h"
@@ -247,10 +250,11 @@ TEST_P(LiveScene, chunksStaySmallWhenAllIsRefinedAtOnce) {
     }
 }
 
-/// First fit; keeps what it was given.
+/// First fit; keeps what it was given. Every so many frames it has time, if that is not all of
+/// them.
 class StrictSink : public PageSink {
 public:
-    explicit StrictSink(size_t bytes) : bytes_(bytes) {}
+    explicit StrictSink(size_t bytes, int every = 1) : bytes_(bytes), every_(every) {}
     ~StrictSink() override { EXPECT_TRUE(pages_.empty()) << "pages are left behind"; }
 
     bool upload(PageKey key, std::span<const Mesh> patches) override {
@@ -263,6 +267,8 @@ public:
             begin = offset + page.size;
         }
         if (begin + size > bytes_) return false;
+        copied += size;
+        late += !had_time_;
         pages_[begin] = {key, size, {patches.begin(), patches.end()}};
         used_ += size;
         return true;
@@ -274,9 +280,11 @@ public:
         used_ -= found->second.size;
         pages_.erase(found);
     }
-    bool mayUpload(size_t) override { return true; }
+    bool mayUpload(size_t) override { return had_time_ = ++asked_ % every_ == 0; }
     size_t usedBytes() const override { return used_; }
     size_t capacityBytes() const override { return bytes_; }
+    size_t copied = 0;  ///< so far
+    int late = 0;       ///< pages copied when there was no time
     const std::vector<Mesh>* find(PageKey key) const {
         for (const auto& [offset, page] : pages_)
             if (page.key == key) return &page.patches;
@@ -290,8 +298,55 @@ private:
         std::vector<Mesh> patches;
     };
     const size_t bytes_;
+    const int every_;
+    int asked_ = 0;
+    bool had_time_ = true;
     size_t used_ = 0;
     std::map<size_t, Page> pages_;
+};
+
+/// A model that tells what is asked of it.
+class WatchedModel : public LiveModel {
+public:
+    static inline size_t largest_budget, releases, freed_by_frames;
+    static inline std::thread::id frame_thread;
+
+    static std::unique_ptr<LiveModel> open(const ModelReader& reader) {
+        auto model = std::make_unique<WatchedModel>();
+        model->model_ = openLive(reader);
+        largest_budget = releases = freed_by_frames = 0;
+        frame_thread = std::this_thread::get_id();
+        return model;
+    }
+    std::unique_ptr<LivePage> decode(uint32_t page, std::span<const std::byte> bytes,
+                                     std::string& fault) const override {
+        auto decoded = std::make_unique<Page>();
+        decoded->page = model_->decode(page, bytes, fault);
+        return decoded;
+    }
+    bool arrive(uint32_t page, const LivePage* decoded) override {
+        return model_->arrive(page, static_cast<const Page*>(decoded)->page.get());
+    }
+    const LiveFrame& adapt(const LiveTask& task) override {
+        largest_budget = std::max(largest_budget, task.most_bytes);
+        return model_->adapt(task);
+    }
+    std::span<const LiveChunk> chunks() const override { return model_->chunks(); }
+    std::vector<uint32_t> requests(size_t most) const override { return model_->requests(most); }
+    std::vector<uint32_t> prefetch(const View& view, double pixels, size_t most) override {
+        return model_->prefetch(view, pixels, most);
+    }
+    size_t bytes() const override { return model_->bytes(); }
+    size_t pageBytes() const override { return model_->pageBytes(); }
+    size_t release(size_t bytes) override { return ++releases, model_->release(bytes); }
+    std::span<const std::string> faults() const override { return model_->faults(); }
+
+private:
+    struct Page : LivePage {
+        std::unique_ptr<LivePage> page;
+        ~Page() override { freed_by_frames += std::this_thread::get_id() == frame_thread; }
+    };
+    std::unique_ptr<LiveModel> model_;
 };
 
 TEST_P(LiveScene, everyFrameIsOneMeshInTheRenderersOwnMemory) {
@@ -320,6 +375,103 @@ TEST_P(LiveScene, everyFrameIsOneMeshInTheRenderersOwnMemory) {
     }
     EXPECT_EQ(*settled.begin(), 0.25);
     EXPECT_GT(settled.size(), 1u);
+}
+
+TEST_P(LiveScene, copiesOnlyWhenThereIsTimeAndNotTooMuch) {
+    buildModel(method(), borderedMesh(400), scratch_, "large");
+    const ModelReader model(scratch_.file("large"));
+    StrictSink sink(size_t(64) << 20, 3);
+    SceneSettings settings = ample();
+    settings.sink = &sink;
+    Scene scene({&model}, settings);
+    const int late = sink.late;
+    size_t frames = 0, largest = 0;
+    for (int i = 0; i < 8; ++i)
+        for (bool settled = false; !settled; ++frames) {
+            const size_t before = sink.copied;
+            settled = scene.update(flight(20 * i, 0.02)).settled;
+            largest = std::max(largest, sink.copied - before);
+        }
+    EXPECT_EQ(sink.late, late);
+    EXPECT_GT(sink.copied, 4 * LiveUploads::kFrameBytes);
+    EXPECT_LE(sink.copied, frames * LiveUploads::kFrameBytes + largest);
+    EXPECT_TRUE(scene.converge(flight(0)).converged);
+}
+
+TEST_P(LiveScene, aShortSinkTakesNothingFromRam) {
+    buildModel(methods()[0], borderedMesh(110), scratch_, "patches");
+    const ModelReader live(scratch_.file("closed")), patches(scratch_.file("patches"));
+    StrictSink sink(150'000);
+    SceneSettings settings{.sink = &sink, .open_live = WatchedModel::open};
+    Scene scene({&patches, &live}, settings);
+    EXPECT_TRUE(scene.converge(flight(0)).raised);
+    EXPECT_EQ(WatchedModel::releases, 0u);
+}
+
+/// It has less than it says.
+class BoastingSink : public StrictSink {
+public:
+    using StrictSink::StrictSink;
+    size_t capacityBytes() const override { return 4 * StrictSink::capacityBytes(); }
+};
+
+TEST_P(LiveScene, noTaskAllowsMoreThanThereIs) {
+    const ModelReader model(scratch_.file("closed"));
+    BoastingSink sink(60'000);
+    SceneSettings settings{.sink = &sink, .open_live = WatchedModel::open};
+    settings.ram_bytes = tableBytes(model) + (size_t(2) << 20);
+    Scene scene({&model}, settings);
+    for (int i = 0; i < 100; ++i) scene.update(flight(7 * i, 0.02));
+    EXPECT_GT(WatchedModel::largest_budget, size_t(1) << 20);
+    EXPECT_LE(WatchedModel::largest_budget, size_t(2) << 20);
+}
+
+TEST_P(LiveScene, framesFreeNoPages) {
+    const ModelReader model(scratch_.file("closed"));
+    {
+        Scene scene({&model}, {.open_live = WatchedModel::open});
+        EXPECT_TRUE(scene.converge(flight(0, 0.1)).converged);
+        EXPECT_GT(scene.update(flight(0, 0.1)).bytes_read, 0u);
+        EXPECT_EQ(WatchedModel::freed_by_frames, 0u);
+    }
+}
+
+/// Of this process.
+size_t residentNow() {
+    std::ifstream file("/proc/self/statm");
+    size_t total = 0, resident = 0;
+    file >> total >> resident;
+    return resident * size_t(::sysconf(_SC_PAGESIZE));
+}
+
+TEST_P(LiveScene, holdsWhatItSaysAndGivesItBack) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "sanitizers keep memory";
+#endif
+    buildModel(method(), borderedMesh(400), scratch_, "large");
+    const ModelReader model(scratch_.file("large"));
+    ::malloc_trim(0);
+    const size_t before = residentNow();
+    const auto live = openLive(model);
+    const View near(flight(0).camera, kSize, model.info().lattice);
+    Camera far_away = flight(0).camera;
+    far_away.eye *= 1e5;
+    const View far(far_away, kSize, model.info().lattice);
+    const size_t least = live->bytes();
+    for (int round = 0; round < 2; ++round) {
+        settle(model, *live, near, 0.01, size_t(1) << 30);
+        ::malloc_trim(0);
+        const size_t held = residentNow() - before;
+        EXPECT_GT(held, 20 * least);
+        EXPECT_LE(held, live->bytes() + live->bytes() / 20);
+        settle(model, *live, far, 1, size_t(1) << 30);
+        const size_t said = live->bytes();
+        const size_t released = live->release(size_t(1) << 30);
+        EXPECT_EQ(released, said - live->bytes());
+        EXPECT_LT(live->bytes(), 2 * least + held / 20);
+        ::malloc_trim(0);
+        EXPECT_LE(residentNow() - before, live->bytes() + held / 6);  // scratch lists stay
+    }
 }
 
 TEST_P(LiveScene, damagedPagesAreToldAndDrawnCoarser) {
