@@ -44,6 +44,9 @@ File::File(const std::string& path, Mode mode) : path_(path) {
         case Mode::kCreate:
             descriptor_ = openOrThrow(path, O_RDWR | O_CREAT | O_TRUNC, "create");
             break;
+        case Mode::kUpdate:
+            descriptor_ = openOrThrow(path, O_RDWR, "open");
+            break;
         case Mode::kTemporary:
             path_ = fmt::format("{}/pietra-{}-XXXXXX", path, ::getpid());
             descriptor_ = ::mkostemp(path_.data(), O_CLOEXEC);
@@ -141,6 +144,10 @@ void File::writeAt(uint64_t offset, const void* data, size_t bytes) {
 void File::sync() {
     if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != EROFS)
         throw IoError(path_, "sync", errno);
+}
+
+void File::truncate(uint64_t bytes) {
+    if (::ftruncate(descriptor_, off_t(bytes)) != 0) throw IoError(path_, "truncate", errno);
 }
 
 AtomicFile::AtomicFile(const std::string& path, bool force) : path_(path) {

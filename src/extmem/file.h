@@ -12,11 +12,11 @@ namespace pietra {
 
 class File {
 public:
-    enum class Mode { kRead, kCreate, kTemporary };
+    enum class Mode { kRead, kCreate, kUpdate, kTemporary };
     File() = default;
     /// kRead: an existing regular file or pipe (a directory is refused). kCreate: truncated, for
-    /// writing and reading. kTemporary: as kCreate, unlinked at once, so that nothing is left
-    /// behind; `path` names the directory.
+    /// writing and reading. kUpdate: the same, but it exists and keeps what it has. kTemporary: as
+    /// kCreate, unlinked at once, so that nothing is left behind; `path` names the directory.
     File(const std::string& path, Mode mode);
     File(File&& other) noexcept;
     File& operator=(File&& other) noexcept;
@@ -40,6 +40,8 @@ public:
     void write(const void* data, size_t bytes);
     void writeAt(uint64_t offset, const void* data, size_t bytes);
     void sync();
+    /// To so many bytes.
+    void truncate(uint64_t bytes);
     void close();
 
 private:

@@ -1,5 +1,7 @@
 #include "extmem/spill.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstring>
 
@@ -25,19 +27,25 @@ bool Spill::growMemory(uint64_t end) {
     return true;
 }
 
+void Spill::openFile() {
+    if (file_.isOpen()) return;
+    file_ = path_.empty() ? File(space_->directory, File::Mode::kTemporary)
+                          : File(path_, File::Mode::kCreate);
+}
+
 /// Under the lock: makes room up to `end`.
 void Spill::extend(uint64_t end) {
     if (end <= end_) return;
     if (!in_file_ && !growMemory(end)) {
+        openFile();
         in_file_ = true;
         file_base_ = end_;
-        file_ = File(space_->directory, File::Mode::kTemporary);
     }
     space_->add(end - end_);
     end_ = end;
 }
 
-/// block(bytes in memory, offset in the data, size) and in_file(offset in the file, in the data,
+/// block(bytes in memory, offset in the data, size) and in_file(position, offset in the data,
 /// size), for all parts of a range. Blocks, once there, never move; only the table of them may, so
 /// it alone is read under the lock.
 template <class Block, class InFile>
@@ -56,7 +64,7 @@ void Spill::forParts(uint64_t position, size_t bytes, Block&& block, InFile&& in
         }
         if (!memory) {
             part = bytes - done;
-            in_file(at - file_base_, done, part);
+            in_file(at, done, part);
         } else {
             block(memory, done, part);
         }
@@ -97,10 +105,35 @@ void Spill::read(uint64_t position, std::span<std::byte> data) const {
         [&](uint64_t from, size_t to, size_t size) { file_.readAt(from, data.data() + to, size); });
 }
 
+void Spill::save() {
+    openFile();
+    const uint64_t end = in_file_ ? file_base_ : end_;
+    while (saved_bytes_ < end) {
+        const size_t within = size_t(saved_bytes_ % kBlock);
+        const size_t part = size_t(std::min<uint64_t>(kBlock - within, end - saved_bytes_));
+        file_.writeAt(saved_bytes_, blocks_[saved_bytes_ / kBlock].get() + within, part);
+        saved_bytes_ += part;
+    }
+    is_saved_ = true;
+}
+
+void Spill::restore(uint64_t bytes) {
+    CHECK_EQ(end_, uint64_t(0));
+    file_ = File(path_, File::Mode::kUpdate);
+    file_.truncate(bytes);
+    is_saved_ = in_file_ = true;
+    file_base_ = 0;
+    end_ = bytes;
+    space_->add(bytes);
+}
+
 void Spill::clear() {
     blocks_.clear();
     reservations_.clear();
+    if (file_.isOpen() && !path_.empty() && !is_saved_) ::unlink(path_.c_str());
     file_.close();
+    is_saved_ = false;
+    saved_bytes_ = 0;
     in_file_ = false;
     space_->remove(end_);
     end_ = 0;

@@ -23,6 +23,7 @@ struct TempSpace {
     std::string directory;
     Budget* budget = nullptr;             ///< memory taken from here, as long as...
     size_t keep_free_bytes = 0;           ///< ...this much of it stays free for the work itself
+    std::string kept{};                   ///< folder of what outlives the process, or none
     std::atomic<uint64_t> bytes{0};       ///< temporary bytes held now, in memory and in files
     std::atomic<uint64_t> peak_bytes{0};  ///< largest value of `bytes`
     void add(uint64_t more);
@@ -31,7 +32,10 @@ struct TempSpace {
 
 class Spill {
 public:
-    explicit Spill(TempSpace& space) : space_(&space) {}
+    /// One with a name can outlive the process, where the space keeps such.
+    explicit Spill(TempSpace& space, const std::string& name = "")
+        : space_(&space),
+          path_(name.empty() || space.kept.empty() ? "" : space.kept + "/" + name) {}
     ~Spill() { clear(); }
     Spill(const Spill&) = delete;
     Spill& operator=(const Spill&) = delete;
@@ -43,13 +47,18 @@ public:
     /// and there is undefined. Nobody reads or writes the same bytes meanwhile. Throws IoError.
     void write(uint64_t position, std::span<const std::byte> data);
     uint64_t bytes() const { return end_; }
-    /// Frees memory and file.
+    /// Only of one that can outlive the process, while nobody else uses it. What it has now lies in
+    /// its file afterwards, which remains, for restore(), whatever becomes of this.
+    void save();
+    void restore(uint64_t bytes);
+    /// Frees memory, and the file but for what was saved.
     void clear();
 
 private:
     static constexpr size_t kBlock = size_t(4) << 20;
     bool growMemory(uint64_t end);
     void extend(uint64_t end);
+    void openFile();
     template <class Block, class InFile>
     void forParts(uint64_t position, size_t bytes, Block&& block, InFile&& in_file) const;
     TempSpace* space_;
@@ -57,8 +66,11 @@ private:
     std::vector<std::unique_ptr<std::byte[]>>
         blocks_;  // the first blocks_.size() * kBlock positions
     std::vector<Reservation> reservations_;
-    File file_;  // positions from file_base_ on
+    const std::string path_;  // of the file, if it has a name
+    File file_;               // positions from file_base_ on, and those that were saved
     uint64_t file_base_ = 0;
+    uint64_t saved_bytes_ = 0;  // of what lies in memory
+    bool is_saved_ = false;
     bool in_file_ = false;
     uint64_t end_ = 0;
 };

@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
+#include <iterator>
 #include <span>
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/scratch_directory.h"
 
 namespace pietra {
 namespace {
@@ -56,6 +59,35 @@ TEST(Spill, isWrittenAtAnyPlace) {
         for (size_t i = 0; i < kPieces; ++i)
             EXPECT_TRUE(
                 std::ranges::equal(std::span(all).subspan(i * kPiece, kPiece), pattern(i, kPiece)));
+    }
+}
+
+TEST(Spill, outlivesTheProcessWhereItWasSaved) {
+    for (const size_t limit : {size_t(0), size_t(4) << 20, size_t(64) << 20}) {
+        Budget budget(limit);
+        const ScratchDirectory scratch;
+        TempSpace space{scratch.path(), &budget, 0, scratch.path()};
+        uint64_t saved = 0;
+        {
+            Spill spill(space, "kept"), unsaved(space, "gone"), unnamed(space);
+            for (const size_t i : {1u, 2u}) {
+                spill.append(pattern(i, 3'000'000));
+                spill.save();
+            }
+            saved = spill.bytes();
+            spill.append(pattern(3, 3'000'000));
+            for (Spill* other : {&unsaved, &unnamed}) other->append(pattern(4, 5'000'000));
+        }
+        EXPECT_EQ(space.bytes, 0u);
+        EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch.path()), {}), 1);
+        Spill spill(space, "kept");
+        spill.restore(saved);
+        EXPECT_EQ(spill.append(pattern(5, 1000)), saved);
+        std::vector<std::byte> all(saved + 1000), expected;
+        spill.read(0, all);
+        for (const auto& [seed, size] : {std::pair(1u, 3'000'000u), {2u, 3'000'000u}, {5u, 1000u}})
+            std::ranges::copy(pattern(seed, size), std::back_inserter(expected));
+        EXPECT_TRUE(all == expected);
     }
 }
 
