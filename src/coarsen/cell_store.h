@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/state.h"
 #include "extmem/spill.h"
 #include "geometry/mesh.h"
 #include "simplify/deviation.h"
@@ -31,12 +32,20 @@ struct CellBlob {
 
 class CellStore {
 public:
-    CellStore(TempSpace& space, int scalar_count) : spill_(space), scalar_count_(scalar_count) {}
+    /// `name`: as a spill's.
+    CellStore(TempSpace& space, int scalar_count, const std::string& name = "")
+        : spill_(space, name), scalar_count_(scalar_count) {}
 
     CellBlob put(const CellMesh& cell);
     /// Overwrites `cell`, keeping its capacity. `blob` is one of this store.
     void get(const CellBlob& blob, CellMesh& cell) const;
     void clear() { spill_.clear(); }
+    /// Blobs remain good, but for their `store`.
+    void save(StateWriter& state) {
+        spill_.save();
+        state.put(spill_.bytes());
+    }
+    void restore(StateReader& state) { spill_.restore(state.get<uint64_t>()); }
 
 private:
     Spill spill_;

@@ -59,6 +59,21 @@ CellTree::CellTree(std::span<const LeafCell> leaves, uint32_t leaf_triangles) {
     is_split_.clear();
 }
 
+CellTree::CellTree(StateReader& state) : split_(state.get<size_t>()) {
+    for (std::vector<CellId>& level : split_) state.get(level);
+    state.get(leaves_);
+    state.get(deepest_);
+    state.get(forced_);
+}
+
+void CellTree::save(StateWriter& state) const {
+    state.put(split_.size());
+    for (const std::vector<CellId>& level : split_) state.put(level);
+    state.put(leaves_);
+    state.put(deepest_);
+    state.put(forced_);
+}
+
 void CellTree::mergeSmall(uint32_t leaf_triangles) {
     std::vector<std::vector<CellId>> by_level(kMaxCellLevel + 1);
     std::unordered_set<CellId> has_split_child;  // cells that cannot become leaves

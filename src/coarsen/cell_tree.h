@@ -10,6 +10,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "base/state.h"
 #include "coarsen/bucket_mesh.h"
 #include "coarsen/cell_path.h"
 
@@ -20,6 +21,9 @@ public:
     /// `leaves`: disjoint, in any order. Small neighbours are merged into their parent while it
     /// stays within `leaf_triangles`; then diamonds are closed by forced splits.
     CellTree(std::span<const LeafCell> leaves, uint32_t leaf_triangles);
+    /// The one that was saved.
+    explicit CellTree(StateReader& state);
+    void save(StateWriter& state) const;
 
     /// Deepest level that has cells.
     int deepestLevel() const { return deepest_; }

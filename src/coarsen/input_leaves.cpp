@@ -7,6 +7,17 @@
 
 namespace pietra {
 
+namespace {
+
+constexpr const char* kStoreName = "leaves";
+
+struct LeafBlob {
+    CellId cell;
+    CellBlob blob;
+};
+
+}  // namespace
+
 MemoryPlan::MemoryPlan(size_t limit, int jobs, size_t corner_bytes) {
     constexpr size_t kProgram = size_t(48) << 20;
     constexpr size_t kLeast = size_t(64) << 20;
@@ -26,7 +37,7 @@ MemoryPlan::MemoryPlan(size_t limit, int jobs, size_t corner_bytes) {
 InputLeaves::InputLeaves(TriangleSource& source, const InputSettings& settings,
                          const MemoryPlan& plan, TempSpace& space, Progress& progress)
     : vertices(source, settings.input_name, settings.precision, space, progress),
-      store(space, int(source.schema().scalars.size())) {
+      store(space, int(source.schema().scalars.size()), kStoreName) {
     if (settings.precision.kind == PrecisionSetting::Kind::kAuto)
         vertices.setShift(chooseShift(source, vertices, plan.partition.batch_triangles, progress));
     Partition partition(source, vertices, plan.partition, space, progress);
@@ -44,6 +55,35 @@ InputLeaves::InputLeaves(TriangleSource& source, const InputSettings& settings,
     const VertexRecord record(source.schema());
     leaves = buildLeaves(partition, record, leaf_settings, space, store, progress);
     moveCrumbs(leaves, store, std::min(kSmallestPatch, settings.leaf_triangles / 8), progress);
+}
+
+InputLeaves::InputLeaves(const AttributeSchema& schema, TempSpace& space, StateReader& state)
+    : vertices(schema, space, state), store(space, int(schema.scalars.size()), kStoreName) {
+    state.get(degenerate);
+    store.restore(state);
+    leaves.tree = std::make_unique<CellTree>(state);
+    std::vector<LeafBlob> blobs;
+    state.get(blobs);
+    for (auto& [cell, blob] : blobs) {
+        blob.store = &store;
+        leaves.blobs.emplace(cell, blob);
+    }
+    state.get(leaves.triangles);
+    state.get(leaves.duplicates);
+    state.get(leaves.edges);
+}
+
+void InputLeaves::save(StateWriter& state) {
+    vertices.save(state);
+    state.put(degenerate);
+    store.save(state);
+    leaves.tree->save(state);
+    std::vector<LeafBlob> blobs;
+    for (const auto& [cell, blob] : leaves.blobs) blobs.push_back({cell, blob});
+    state.put(blobs);
+    state.put(leaves.triangles);
+    state.put(leaves.duplicates);
+    state.put(leaves.edges);
 }
 
 }  // namespace pietra

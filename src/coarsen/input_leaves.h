@@ -35,6 +35,10 @@ public:
     /// Throws InputError where there is nothing to show, and what reading throws.
     InputLeaves(TriangleSource& source, const InputSettings& settings, const MemoryPlan& plan,
                 TempSpace& space, Progress& progress);
+    /// From where save() was called, for the same input and settings.
+    InputLeaves(const AttributeSchema& schema, TempSpace& space, StateReader& state);
+    /// Only where the space keeps what is saved.
+    void save(StateWriter& state);
 
     VertexTable vertices;  ///< without its records
     uint64_t degenerate = 0;

@@ -53,6 +53,21 @@ VertexTable::VertexTable(TriangleSource& source, const std::string& input_name,
     writeRecords(source, progress);
 }
 
+VertexTable::VertexTable(const AttributeSchema& schema, TempSpace& space, StateReader& state)
+    : record_(schema), records_(space) {
+    state.get(lattice_);
+    state.get(bounds_);
+    state.get(count_);
+    state.get(scalar_range_);
+}
+
+void VertexTable::save(StateWriter& state) const {
+    state.put(lattice_);
+    state.put(bounds_);
+    state.put(count_);
+    state.put(scalar_range_);
+}
+
 Box3d VertexTable::readBounds(TriangleSource& source, Progress& progress) {
     progress.beginStage("read vertices", source.vertexCount());
     Box3d box;

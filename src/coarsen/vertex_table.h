@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "base/state.h"
 #include "extmem/spill.h"
 #include "geometry/bounds.h"
 #include "geometry/lattice.h"
@@ -47,6 +48,10 @@ public:
     /// (a step too fine for 21 bits).
     VertexTable(TriangleSource& source, const std::string& input_name,
                 const PrecisionSetting& precision, TempSpace& space, Progress& progress);
+
+    /// Without records, from where save() was called.
+    VertexTable(const AttributeSchema& schema, TempSpace& space, StateReader& state);
+    void save(StateWriter& state) const;
 
     const VertexRecord& record() const { return record_; }
     const Lattice& lattice() const { return lattice_; }

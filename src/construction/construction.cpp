@@ -1,13 +1,18 @@
 #include "construction/construction.h"
 
+#include <fmt/format.h>
+
 #include <filesystem>
 
 namespace pietra {
 namespace {
 
-Progress& withStages(Progress& progress, int stages) {
-    progress.setStages(InputLeaves::kStages + stages + 1);
-    return progress;
+/// What decides the bytes of the model, and the files that it comes from.
+std::string identityOf(const BuildSettings& settings, const char* method) {
+    if (settings.input_identity.empty()) return "";
+    return fmt::format("{}\n{} {} {} {} {}", settings.input_identity, method,
+                       int(settings.precision.kind), settings.precision.step,
+                       settings.leaf_triangles, settings.patch_triangles);
 }
 
 }  // namespace
@@ -20,11 +25,41 @@ Construction::Construction(TriangleSource& source, const BuildSettings& settings
       threads_(settings.jobs),
       plan_(settings.memory_bytes, settings.jobs, VertexRecord(source.schema()).bytes),
       budget_(plan_.budget),
-      space{settings.temp_dir, &budget_, plan_.work},
+      checkpoint(settings.temp_dir, identityOf(settings, kind.name), settings.resume,
+                 settings.checkpoint_seconds),
+      space{settings.temp_dir, &budget_, plan_.work, checkpoint.folder()},
       writer(settings.output, settings.force, settings.temp_dir, budget_),
-      input(source,
-            {settings.input_name, settings.precision, settings.leaf_triangles, kind.mark_irregular},
-            plan_, space, withStages(progress, kind.stages)) {}
+      input(readInput(progress)) {
+    if (checkpoint.isDue()) saveInput();
+}
+
+InputLeaves Construction::readInput(Progress& progress) {
+    if (checkpoint.resumes()) {
+        input_saved_ = true;
+        progress.setStages(kind_.stages + 1);
+        StateReader state = *checkpoint.load(Checkpoint::kFirst);
+        notes_.resize(state.get<size_t>());
+        for (std::string& note : notes_) state.get(note);
+        return InputLeaves(source_.schema(), space, state);
+    }
+    progress.setStages(InputLeaves::kStages + kind_.stages + 1);
+    return InputLeaves(
+        source_,
+        {settings_.input_name, settings_.precision, settings_.leaf_triangles, kind_.mark_irregular},
+        plan_, space, progress);
+}
+
+/// Once.
+void Construction::saveInput() {
+    if (input_saved_) return;
+    notes_ = source_.notes();
+    StateWriter state;
+    state.put(notes_.size());
+    for (const std::string& note : notes_) state.put(note);
+    input.save(state);
+    checkpoint.save(Checkpoint::kFirst, state);
+    input_saved_ = true;
+}
 
 BuildReport Construction::report() const {
     BuildReport report;
@@ -35,7 +70,8 @@ BuildReport Construction::report() const {
     report.border_edges = input.leaves.edges.border;
     report.non_manifold_edges = input.leaves.edges.non_manifold;
     report.inconsistent_edges = input.leaves.edges.inconsistent;
-    report.notes = source_.notes();
+    report.notes = checkpoint.resumes() ? notes_ : source_.notes();
+    report.resumed = checkpoint.resumes();
     return report;
 }
 
@@ -54,7 +90,8 @@ ModelInfo Construction::info() const {
     return info;
 }
 
-void Construction::finish(BuildReport& report) const {
+void Construction::finish(BuildReport& report) {
+    checkpoint.finish();
     report.output_bytes = std::filesystem::file_size(settings_.output);
     report.temp_bytes_peak = space.peak_bytes;
 }

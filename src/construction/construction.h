@@ -5,6 +5,7 @@
 
 #include "base/parallel.h"
 #include "coarsen/input_leaves.h"
+#include "construction/checkpoint.h"
 #include "multires/method.h"
 #include "store/model_writer.h"
 
@@ -18,7 +19,8 @@ public:
         int stages;  ///< of progress, between the leaves and writing
         bool mark_irregular = false;
     };
-    /// Reads the input. All must outlive this. Throws what a build throws.
+    /// Reads the input, or takes up what an interrupted build left of it. All must outlive this.
+    /// Throws what a build throws.
     Construction(TriangleSource& source, const BuildSettings& settings, const Kind& kind,
                  Progress& progress);
 
@@ -26,17 +28,36 @@ public:
     BuildReport report() const;
     ModelInfo info() const;
     /// After the writer has finished: sizes are added.
-    void finish(BuildReport& report) const;
+    void finish(BuildReport& report);
+    /// From where the method is in its work, should it be interrupted; where it is not worth it, or
+    /// nothing is kept, only says no. Spills that `write` saves have been given names.
+    template <class Write>
+    bool savedState(Write&& write) {
+        if (!checkpoint.isDue()) return false;
+        saveInput();
+        StateWriter state;
+        write(state);
+        checkpoint.save(kMethodPart, state);
+        return true;
+    }
+    std::optional<StateReader> stateToResume() const { return checkpoint.load(kMethodPart); }
 
 private:
+    static constexpr const char* kMethodPart = "method";
+    InputLeaves readInput(Progress& progress);
+    void saveInput();
+
     TriangleSource& source_;
     const BuildSettings& settings_;
     const Kind kind_;
     const ThreadLimit threads_;
     const MemoryPlan plan_;
     Budget budget_;
+    std::vector<std::string> notes_;  ///< of the source
+    bool input_saved_ = false;
 
 public:
+    Checkpoint checkpoint;
     TempSpace space;
     /// Made first: an output that exists or cannot be written is known before any work.
     ModelWriter writer;

@@ -30,6 +30,11 @@ struct BuildSettings {
     uint32_t patch_triangles = 2000;  ///< coarse patches are about this large
     std::string input_name;           ///< for messages
     uint32_t input_files = 1;
+    /// What tells the input's files from all others, and from what they were before they changed;
+    /// empty: nothing is kept when the build is interrupted.
+    std::string input_identity;
+    bool resume = false;            ///< go on where another build was interrupted
+    double checkpoint_seconds = 5;  ///< of work that may be lost, at least
 };
 
 /// What it did. Bytes and seconds.
@@ -38,6 +43,7 @@ struct BuildReport {
     uint64_t dropped_degenerate = 0, dropped_duplicate = 0;
     uint64_t stored_triangles = 0, nodes = 0;
     uint32_t levels = 0;
+    bool resumed = false;
     uint64_t temp_bytes_peak = 0, output_bytes = 0;
     uint64_t border_edges = 0, non_manifold_edges = 0, inconsistent_edges = 0;
     std::vector<std::string> notes;  ///< sentences for the user
@@ -47,7 +53,7 @@ struct Method {
     const char* name;     ///< as in --method and in the file
     const char* summary;  ///< one line for --help
     /// Builds a model file from a source. Throws the errors of base/error.h; leaves nothing behind
-    /// when it does. Stays within settings.memory_bytes. Output bytes depend on the input, the
+    /// when it does, but what resuming takes (construction/checkpoint.h). Stays within settings.memory_bytes. Output bytes depend on the input, the
     /// precision and the patch sizes alone.
     BuildReport (*build)(TriangleSource& source, const BuildSettings& settings, Progress& progress);
     /// Errors are proven bounds of the distance to the input; else estimates.

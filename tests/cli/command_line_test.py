@@ -8,6 +8,7 @@ import array
 import json
 import math
 import os
+import resource
 import signal
 import struct
 import subprocess
@@ -180,8 +181,8 @@ class Build(CommandLineTest):
                "build: --jobs: '0' must be at least 1" + end)
         refuse(["build", "tet.ply", "-o", "x.pietra", "--precision", "fine"], 2,
                "build: --precision: 'fine' is neither auto nor finest nor a number above 0" + end)
-        refuse(["build", "tet.ply", "-o", "x.pietra", "--resume"], 2,
-               "resuming is not available yet: start again without --resume")
+        refuse(["build", "tet.ply", "-o", "x.pietra", "--checkpoint", "-1"], 2,
+               "build: --checkpoint: '-1' must be at least 0" + end)
         refuse(["build", "tet.ply", "-o", "x.pietra", "--temp-dir", "no"], 4,
                "no: cannot use as --temp-dir: No such file or directory")
         refuse(["build", "tet.ply", "-o", "x.pietra", "--report", "no/r.json"], 4,
@@ -262,6 +263,116 @@ class Build(CommandLineTest):
             self.assertEqual(process.returncode, 130, rest)
             self.assertEqual(rest.split("\n")[-2], "pietra: interrupted")
             self.assertEqual(sorted(os.listdir(self.folder)), ["tet.ply", "torus.ply"])
+
+
+class Resume(CommandLineTest):
+    """Builds that were interrupted and go on."""
+
+    ARGUMENTS = ["torus.ply", "--leaf-triangles", "300", "--patch-triangles", "200", "--jobs", "2"]
+
+    def setUp(self):
+        super().setUp()
+        write_torus(self.path("torus.ply"), 300, 300)
+
+    def folder_of_resume(self):
+        return [f for f in os.listdir(self.folder) if f.endswith(".resume")]
+
+    def state(self, part):
+        """Changes when another state is saved; None while there is none."""
+        for folder in self.folder_of_resume():
+            try:
+                return os.stat(self.path(f"{folder}/{part}.state")).st_ino
+            except FileNotFoundError:
+                pass
+        return None
+
+    def stop(self, method, signal_number, part, *more):
+        """Starts to build x.pietra and ends it after this part of the state was saved again."""
+        before = self.state(part) if "--resume" in more else None
+        process = subprocess.Popen(
+            [PIETRA, "build", "-o", "x.pietra", "--method", method, "--checkpoint", "0"] +
+            self.ARGUMENTS + list(more), cwd=self.folder, stderr=subprocess.PIPE, text=True)
+        while process.poll() is None and self.state(part) in (None, before):
+            pass
+        process.send_signal(signal_number)
+        rest = process.communicate(timeout=60)[1]
+        self.assertFalse(os.path.exists(self.path("x.pietra")), "it was too fast: " + rest)
+        self.assertEqual(process.returncode,
+                         130 if signal_number == signal.SIGINT else -signal_number, rest)
+
+    def resume(self, method, *more):
+        run = self.run_pietra("build", "-o", "x.pietra", "--method", method, "--resume", "--report",
+                              "-", *self.ARGUMENTS, *more)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertEqual(self.folder_of_resume(), [])
+        return json.loads(run.stdout)["resumed"]
+
+    def test_the_same_bytes_as_without_interruption(self):
+        for method, part, number in (("pmesh", "input", signal.SIGKILL),
+                                     ("pmesh", "method", signal.SIGINT),
+                                     ("tetra", "input", signal.SIGINT)):
+            self.build(*self.ARGUMENTS[:1], "whole.pietra", "--method", method,
+                       *self.ARGUMENTS[1:])
+            self.stop(method, number, part)
+            self.assertTrue(self.resume(method))
+            self.assertEqual(self.read("x.pietra"), self.read("whole.pietra"))
+            os.remove(self.path("x.pietra"))
+            os.remove(self.path("whole.pietra"))
+
+    def test_twice(self):
+        self.build("torus.ply", "whole.pietra", "--method", "pmesh", *self.ARGUMENTS[1:])
+        self.stop("pmesh", signal.SIGKILL, "method")
+        self.stop("pmesh", signal.SIGKILL, "method", "--resume", "--jobs", "1")
+        self.assertTrue(self.resume("pmesh", "--memory", "128M"))
+        self.assertEqual(self.read("x.pietra"), self.read("whole.pietra"))
+
+    def test_nothing_to_resume(self):
+        self.assertFalse(self.resume("pmesh"))
+        os.remove(self.path("x.pietra"))
+        self.stop("pmesh", signal.SIGKILL, "method")
+        folder, = self.folder_of_resume()
+        os.utime(self.path("torus.ply"))  # what was left is of another input now
+        run = self.run_pietra("build", "-o", "x.pietra", "--method", "pmesh", "--resume",
+                              "--report", "-", *self.ARGUMENTS)
+        self.assertFalse(json.loads(run.stdout)["resumed"])
+        self.assertEqual(self.folder_of_resume(), [folder])
+
+    def test_damage_starts_afresh(self):
+        self.build("torus.ply", "whole.pietra", "--method", "pmesh", *self.ARGUMENTS[1:])
+        for part in ("input", "method"):
+            self.stop("pmesh", signal.SIGKILL, "method")
+            folder, = self.folder_of_resume()
+            with open(self.path(f"{folder}/{part}.state"), "r+b") as file:
+                file.seek(100)
+                file.write(b"damage")
+            self.assertEqual(self.resume("pmesh"), part == "method")
+            self.assertEqual(self.read("x.pietra"), self.read("whole.pietra"))
+            os.remove(self.path("x.pietra"))
+
+    def test_a_full_disk(self):
+        """Of the collapses, which grow, less than all have room."""
+        def no_room():
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (3_900_000, 3_900_000))
+
+        self.build("torus.ply", "whole.pietra", "--method", "pmesh", *self.ARGUMENTS[1:])
+        run = self.run_pietra("build", "-o", "x.pietra", "--method", "pmesh", "--checkpoint", "0",
+                              *self.ARGUMENTS, preexec_fn=no_room)
+        self.assertEqual(run.returncode, 4, run.stderr)
+        self.assertRegex(run.stderr, "cannot write: File too large\n$")
+        self.assertTrue(self.resume("pmesh"))
+        self.assertEqual(self.read("x.pietra"), self.read("whole.pietra"))
+
+    def test_one_at_a_time(self):
+        process = subprocess.Popen(
+            [PIETRA, "build", "-o", "x.pietra", "--progress", "json"] + self.ARGUMENTS,
+            cwd=self.folder, stderr=subprocess.PIPE, text=True)
+        process.stderr.readline()  # it is at work now
+        run = self.run_pietra("build", "-o", "y.pietra", "--resume", *self.ARGUMENTS)
+        self.assertEqual((run.returncode, run.stderr),
+                         (2, "pietra: this model is being built by another process\n"))
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
 
 
 class Model(CommandLineTest):

@@ -34,6 +34,18 @@ bool sameFile(const std::string& a, const std::string& b) {
            first.st_dev == second.st_dev && first.st_ino == second.st_ino;
 }
 
+/// Empty if there is no saying whether they will be the same next time.
+std::string identityOf(const std::vector<std::string>& inputs) {
+    std::string identity;
+    for (const std::string& input : inputs) {
+        struct stat info {};
+        if (::stat(input.c_str(), &info) != 0 || !S_ISREG(info.st_mode)) return "";
+        identity += fmt::format("{} {} {} {}.{}\n", info.st_dev, info.st_ino, info.st_size,
+                                info.st_mtim.tv_sec, info.st_mtim.tv_nsec);
+    }
+    return identity;
+}
+
 std::string folderOf(const std::string& path) {
     const size_t slash = path.rfind('/');
     return slash == std::string::npos ? "." : path.substr(0, slash + 1);
@@ -79,6 +91,7 @@ private:
     uint64_t leaf_triangles_ = BuildSettings().leaf_triangles;
     uint64_t patch_triangles_ = BuildSettings().patch_triangles;
     bool resume_ = false;
+    double checkpoint_seconds_ = BuildSettings().checkpoint_seconds;
     bool dry_run_ = false;
 };
 
@@ -113,9 +126,14 @@ void BuildVerb::declare(OptionSet& options) {
     limits_.declare(options);
     options
         .text("--temp-dir", "DIR", temp_dir_,
-              "Where temporary files go; they have no names and vanish with the process.")
+              "Where temporary files go; they vanish with the process, but for what an interrupted "
+              "build leaves for --resume.")
         .defaultsTo("the output's folder");
-    options.flag("--resume", resume_, "Go on with an interrupted build; not available yet.");
+    options.flag("--resume", resume_,
+                 "Go on with an interrupted build of the same input and settings; with nothing to "
+                 "go on with, starts afresh.");
+    options.number("--checkpoint", "SECONDS", checkpoint_seconds_, {.min = 0},
+                   "Of work that an interruption may cost, about: less is not kept.");
     options.custom("--precision", "auto|finest|STEP", "auto",
                    "Spacing of the lattice onto which vertices move: the coarsest that keeps the "
                    "error below 1/50 of the median edge (auto), the finest, of 21 bits an axis, or "
@@ -135,7 +153,6 @@ std::string BuildVerb::inputName() const {
 }
 
 BuildSettings BuildVerb::settings(const RunContext& context) const {
-    if (resume_) throw UsageError("resuming is not available yet: start again without --resume");
     BuildSettings settings;
     settings.output = output_;
     settings.force = context.common.force;
@@ -147,6 +164,9 @@ BuildSettings BuildVerb::settings(const RunContext& context) const {
     settings.patch_triangles = uint32_t(patch_triangles_);
     settings.input_name = inputName();
     settings.input_files = uint32_t(inputs_.size());
+    settings.input_identity = identityOf(inputs_);
+    settings.resume = resume_;
+    settings.checkpoint_seconds = checkpoint_seconds_;
     for (const std::string& input : inputs_)
         if (sameFile(input, output_))
             throw UsageError(fmt::format("{}: is an input and the output", output_));
@@ -209,7 +229,7 @@ Json BuildVerb::report(const BuildReport& result, const BuildSettings& settings,
             {"ranks", 1},
             {"dropped",
              {{"degenerate", result.dropped_degenerate}, {"duplicate", result.dropped_duplicate}}},
-            {"resumed", false},
+            {"resumed", result.resumed},
             {"nodes", result.nodes},
             {"levels", result.levels},
             {"notes", result.notes}};

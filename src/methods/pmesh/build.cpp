@@ -71,8 +71,7 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
     PageSpill pages(work.space);
     {
         Collapses collapses(work.space);
-        collapseByDiamonds(work.input, settings.patch_triangles, settings.jobs, work.space,
-                           progress, collapses);
+        collapseByDiamonds(work, settings, progress, collapses);
         progress.beginStage("encode", collapses.store.size());
         forest = encode(collapses, info.lattice, work.space, counts,
                         [&](NodeIndex n, const NodeRow& row, const OperationNode& node) {

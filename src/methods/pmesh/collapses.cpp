@@ -20,4 +20,18 @@ void CollapseStore::append(std::span<const CollapseLink> links,
     size_ += uint32_t(records.size());
 }
 
+void CollapseStore::save(StateWriter& state) {
+    for (Spill* spill : {&links_, &shapes_, &rings_, &aliases_}) {
+        spill->save();
+        state.put(spill->bytes());
+    }
+    state.put(size_);
+}
+
+void CollapseStore::restore(StateReader& state) {
+    for (Spill* spill : {&links_, &shapes_, &rings_, &aliases_})
+        spill->restore(state.get<uint64_t>());
+    state.get(size_);
+}
+
 }  // namespace pietra::pmesh

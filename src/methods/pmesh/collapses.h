@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "base/state.h"
 #include "extmem/cached_records.h"
 #include "extmem/spill.h"
 #include "geometry/mesh.h"
@@ -27,7 +28,10 @@ struct VertexAlias {
 class CollapseStore {
 public:
     explicit CollapseStore(TempSpace& space)
-        : links_(space), shapes_(space), rings_(space), aliases_(space) {}
+        : links_(space, "links"),
+          shapes_(space, "shapes"),
+          rings_(space, "rings"),
+          aliases_(space, "aliases") {}
 
     /// Of one diamond. `number`: of the vertices that the rings mean; in the links, `u` is an id.
     void append(std::span<const CollapseLink> links, std::span<const CollapseRecord> records,
@@ -35,6 +39,8 @@ public:
     void append(std::span<const VertexAlias> aliases) { aliases_.append(std::as_bytes(aliases)); }
 
     uint32_t size() const { return size_; }
+    void save(StateWriter& state);
+    void restore(StateReader& state);
     uint64_t aliasCount() const { return aliases_.bytes() / sizeof(VertexAlias); }
     /// By record. For one thread each.
     CachedRecords<CollapseLink> links() const { return CachedRecords<CollapseLink>(links_); }

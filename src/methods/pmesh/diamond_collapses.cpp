@@ -1,5 +1,7 @@
 #include "methods/pmesh/diamond_collapses.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstring>
 #include <unordered_map>
@@ -45,6 +47,12 @@ VertexState stateOf(const Mesh& mesh, size_t v) {
 struct Cell {
     CellBlob blob;
     float error = 0;  ///< largest of its vertices
+};
+
+struct SavedCell {
+    CellId id;
+    Cell cell;
+    bool is_leaf;
 };
 
 struct DiamondResult {
@@ -188,19 +196,27 @@ void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult&
 
 class LevelCollapser {
 public:
-    LevelCollapser(InputLeaves& input, uint32_t patch_triangles, int jobs, TempSpace& space,
-                   Progress& progress, Collapses& out)
-        : input_(input),
-          patch_triangles_(patch_triangles),
-          jobs_(jobs),
-          space_(space),
+    LevelCollapser(Construction& work, const BuildSettings& settings, Progress& progress,
+                   Collapses& out)
+        : work_(work),
+          input_(work.input),
+          patch_triangles_(settings.patch_triangles),
+          jobs_(settings.jobs),
+          space_(work.space),
           progress_(progress),
           out_(out),
-          workers_([&input] { return Collapser(input.vertices.lattice().shift); }) {}
+          workers_([this] { return Collapser(input_.vertices.lattice().shift); }) {}
 
     void run() {
         progress_.beginStage("collapse", input_.leaves.triangles * 3);
-        for (int level = input_.leaves.tree->deepestLevel(); level >= 0; --level) runLevel(level);
+        int level = input_.leaves.tree->deepestLevel();
+        if (auto state = work_.stateToResume()) level = restore(*state);
+        for (; level >= 0; --level) {
+            runLevel(level);
+            if (!work_.savedState([&](StateWriter& state) { save(level, state); })) continue;
+            if (!saved_cells_.empty()) work_.checkpoint.remove(saved_cells_);
+            saved_cells_ = cellsOf(level);
+        }
         runRoot();
     }
 
@@ -208,6 +224,9 @@ private:
     void runLevel(int level);
     DiamondResult runDiamond(const LevelItem& item, int level);
     void runRoot();
+    static std::string cellsOf(int level) { return fmt::format("cells-{}", level); }
+    void save(int level, StateWriter& state);
+    int restore(StateReader& state);
     void addCell(const Cell& cell, uint8_t label, Collapser& worker) const {
         cell.blob.store->get(cell.blob, worker.scratch);
         worker.add(worker.scratch.mesh, cell.blob.store == &input_.store, label);
@@ -217,6 +236,7 @@ private:
         return record == kNoOperation || record < kLocal ? record : first + (record - kLocal);
     }
 
+    Construction& work_;
     InputLeaves& input_;
     uint32_t patch_triangles_;
     int jobs_;
@@ -226,6 +246,7 @@ private:
     PerThread<Collapser> workers_;
     std::unordered_map<CellId, Cell> below_, cells_;
     std::unique_ptr<CellStore> store_below_, store_;
+    std::string saved_cells_;  // what the last state that was saved means
 };
 
 void LevelCollapser::runLevel(int level) {
@@ -233,7 +254,7 @@ void LevelCollapser::runLevel(int level) {
         const auto found = below_.find(cell);
         return found == below_.end() ? nullptr : &found->second.blob;
     });
-    store_ = std::make_unique<CellStore>(space_, int(kStateFloats));
+    store_ = std::make_unique<CellStore>(space_, int(kStateFloats), cellsOf(level));
     cells_.clear();
     std::vector<LevelItem> diamonds;
     for (const LevelItem& item : items) {
@@ -248,6 +269,41 @@ void LevelCollapser::runLevel(int level) {
         [&](DiamondResult& result) { take(result); });
     below_ = std::move(cells_);
     store_below_ = std::move(store_);
+}
+
+/// What finished levels leave.
+void LevelCollapser::save(int level, StateWriter& state) {
+    state.put(level);
+    store_below_->save(state);
+    std::vector<SavedCell> cells;
+    for (const auto& [id, cell] : below_)
+        cells.push_back({id, cell, cell.blob.store == &input_.store});
+    state.put(cells);
+    out_.store.save(state);
+    state.put(out_.numbers);
+    state.put(out_.largest_height);
+    state.put(out_.dummies);
+    state.put(out_.refused);
+}
+
+/// The level that is next.
+int LevelCollapser::restore(StateReader& state) {
+    const int level = state.get<int>();
+    saved_cells_ = cellsOf(level);
+    store_below_ = std::make_unique<CellStore>(space_, int(kStateFloats), saved_cells_);
+    store_below_->restore(state);
+    std::vector<SavedCell> cells;
+    state.get(cells);
+    for (SavedCell& saved : cells) {
+        saved.cell.blob.store = saved.is_leaf ? &input_.store : store_below_.get();
+        below_.emplace(saved.id, saved.cell);
+    }
+    out_.store.restore(state);
+    state.get(out_.numbers);
+    state.get(out_.largest_height);
+    state.get(out_.dummies);
+    state.get(out_.refused);
+    return level - 1;
 }
 
 DiamondResult LevelCollapser::runDiamond(const LevelItem& item, int level) {
@@ -340,10 +396,10 @@ void LevelCollapser::runRoot() {
 
 }  // namespace
 
-void collapseByDiamonds(InputLeaves& input, uint32_t patch_triangles, int jobs, TempSpace& space,
-                        Progress& progress, Collapses& out) {
-    LevelCollapser(input, patch_triangles, jobs, space, progress, out).run();
-    input.store.clear();
+void collapseByDiamonds(Construction& work, const BuildSettings& settings, Progress& progress,
+                        Collapses& out) {
+    LevelCollapser(work, settings, progress, out).run();
+    work.input.store.clear();
 }
 
 }  // namespace pietra::pmesh

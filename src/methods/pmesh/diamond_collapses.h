@@ -10,14 +10,14 @@
 // Records are counted in the order of the diamonds, from fine to coarse: the result does
 // not depend on threads.
 
-#include "coarsen/input_leaves.h"
+#include "construction/construction.h"
 #include "methods/pmesh/collapses.h"
 
 namespace pietra::pmesh {
 
-/// Consumes the leaves; `out` is empty. Memory: the diamonds at work, and some tens of bytes a
-/// cell.
-void collapseByDiamonds(InputLeaves& input, uint32_t patch_triangles, int jobs, TempSpace& space,
-                        Progress& progress, Collapses& out);
+/// Consumes the leaves; `out` is empty. Goes on from the last finished level where the construction
+/// resumes. Memory: the diamonds at work, and some tens of bytes a cell.
+void collapseByDiamonds(Construction& work, const BuildSettings& settings, Progress& progress,
+                        Collapses& out);
 
 }  // namespace pietra::pmesh
