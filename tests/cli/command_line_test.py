@@ -353,7 +353,7 @@ class Resume(CommandLineTest):
         """Of the collapses, which grow, less than all have room."""
         def no_room():
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-            resource.setrlimit(resource.RLIMIT_FSIZE, (3_900_000, 3_900_000))
+            resource.setrlimit(resource.RLIMIT_FSIZE, (3_400_000, 3_400_000))
 
         self.build("torus.ply", "whole.pietra", "--method", "pmesh", *self.ARGUMENTS[1:])
         run = self.run_pietra("build", "-o", "x.pietra", "--method", "pmesh", "--checkpoint", "0",
