@@ -61,7 +61,7 @@ void Adaption::scan() {
         set->clear();
         set->resize(count);
     }
-    parallelForSlices(marked_.words(), 64, [&](size_t begin, size_t end) {
+    const auto slice = [&](size_t begin, size_t end) {
         for (size_t w = begin; w < end; ++w) {
             const size_t first = 64 * w;
             auto [split, merge] =
@@ -72,7 +72,10 @@ void Adaption::scan() {
             fresh_.insertWord(w, split);
             may_merge_.insertWord(w, merge);
         }
-    });
+    };
+    constexpr size_t kShared = 1 << 17;  // vertices; below, to wake others takes longer
+    if (count < kShared) return slice(0, marked_.words());
+    parallelForSlices(marked_.words(), 64, slice);
 }
 
 /// Of vertices 64 w and on: what criteria that are only a reference's need is not needed yet, but
