@@ -66,7 +66,7 @@ void reportPages(const NodeForest& forest, const BuildCounts& counts) {
     OperationNode node;
     std::string fault;
     for (NodeIndex n = 0; n < pages.size(); ++n)
-        if (!decodeNode(pages[n], n, forest.row[n], node, fault))
+        if (!decodeNode(pages[n], n, forest.row[n], forest.layout, node, fault))
             std::printf("%s\n", fault.c_str());
     const double rate = 1e-6 * double(counts.operations);
     std::printf("  pages: %.2f bytes an operation; %.2f M operations/s encoded, %.2f decoded\n",

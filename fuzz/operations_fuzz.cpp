@@ -30,13 +30,13 @@ void fuzzNode(const uint8_t* head, std::span<const std::byte> bytes) {
     OperationNode node;
     std::string fault;
     const NodeIndex index = head[1] & 4 ? 3 : 0;
-    if (!decodeNode(bytes, index, rowFrom(head), node, fault)) {
+    if (!decodeNode(bytes, index, rowFrom(head), {}, node, fault)) {
         CHECK(!fault.empty());
         return;
     }
     // What was accepted survives.
     OperationNode again;
-    CHECK(decodeNode(encodeNode(node), index, rowFrom(head), again, fault));
+    CHECK(decodeNode(encodeNode(node), index, rowFrom(head), {}, again, fault));
     CHECK(again == node);
 }
 

@@ -188,7 +188,8 @@ bool CollapseLoop::collapse(uint32_t lane) {
         queue_.push(cost, {u, v, candidates_.stamp[lane]});
         return false;
     }
-    if (sink_ && !sink_->take({mesh_, u, v, at, deviation, collapser_.ring(), collapser_.wings()}))
+    if (sink_ && !sink_->take({mesh_, u, v, at, deviation, collapser_.ring(), collapser_.wings(),
+                               attributes_}))
         return false;
     collapser_.apply(u, v, at);
     std::array<float, kMaxQuadricAttributes> values;

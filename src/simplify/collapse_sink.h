@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "simplify/attributes.h"
 #include "simplify/collapse.h"
 #include "simplify/working_mesh.h"
 
@@ -17,6 +18,7 @@ struct CollapseStep {
     float deviation;             ///< see Collapser::deviation()
     const Ring& ring;            ///< the triangles that remain, those of u first
     std::span<const Wing> wing;  ///< those that die
+    const VertexAttributes& attributes;
 };
 
 class CollapseSink {

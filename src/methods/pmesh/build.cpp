@@ -60,11 +60,7 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
                       progress);
     BuildReport report = work.report();
     report.stored_triangles = work.input.leaves.triangles;
-    if (source.schema().colours || !source.schema().scalars.empty())
-        report.notes.push_back("this method does not carry colours and scalars yet");
     ModelInfo info = work.info();
-    info.schema = {};
-    info.schema.normals_given = source.schema().normals_given;
 
     BuildCounts counts;
     NodeForest forest;

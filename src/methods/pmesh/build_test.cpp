@@ -4,6 +4,8 @@
 
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <random>
 
 #include "io/memory_source.h"
 #include "methods/pmesh/model.h"
@@ -22,6 +24,9 @@ protected:
         std::vector<MemorySource::Index> triangles;
         for (const Triangle& t : mesh.triangle) triangles.push_back({t[0], t[1], t[2]});
         MemorySource source(positions, triangles);
+        return build(source, leaf_triangles);
+    }
+    BuildReport build(MemorySource& source, uint32_t leaf_triangles) {
         BuildSettings settings;
         settings.output = path_;
         settings.force = true;
@@ -86,6 +91,51 @@ TEST_P(BuiltFile, IsSoundAndItsFinestTheInput) {
         for (Vec3i& p : finest.position) p = p >> shift;
         EXPECT_EQ(cornersOf(finest, leastOf(finest)), cornersOf(input, leastOf(input)));
     }
+}
+
+/// Of each vertex of the finest mesh, exactly: by its place.
+TEST_P(BuiltFile, CarriesColoursAndScalars) {
+    Mesh input = GetParam().make();
+    VertexBatch vertices;
+    std::mt19937 random(5);
+    std::map<std::array<int32_t, 3>, std::pair<Rgba8, std::array<float, 2>>> expected;
+    const Vec3i least = leastOf(input);
+    for (const Vec3i& p : input.position) {
+        vertices.position.push_back(Vec3d(p));
+        const auto byte = [&] { return uint8_t(random()); };
+        vertices.colour.push_back({byte(), byte(), byte(), byte()});
+        const std::array<float, 2> scalars{float(p.x) * 0.1f, float(random() % 1000) - 500.0f};
+        vertices.scalar.insert(vertices.scalar.end(), scalars.begin(), scalars.end());
+        const Vec3i q = p - least;
+        expected[{q.x, q.y, q.z}] = {vertices.colour.back(), scalars};
+    }
+    std::vector<MemorySource::Index> triangles;
+    for (const Triangle& t : input.triangle) triangles.push_back({t[0], t[1], t[2]});
+    MemorySource source({false, true, {"a", "b"}}, vertices, triangles);
+    build(source, 64);
+    const ModelReader reader(path_);
+    EXPECT_EQ(reader.info().schema, source.schema());
+    const auto model = openModel(reader);
+    EXPECT_EQ(model->modelFault(budget_), "");
+    const Mesh finest = model->cut({}, budget_).mesh;
+    ASSERT_EQ(finest.colour.size(), finest.vertexCount());
+    ASSERT_EQ(finest.scalar.size(), 2 * finest.vertexCount());
+    const int shift = reader.info().lattice.shift;
+    if (reader.info().quantisation_error > float(1 << shift)) return;  // rounded offsets
+    Mesh moved = finest;
+    for (Vec3i& p : moved.position) p = p >> shift;
+    const Vec3i corner = leastOf(moved);
+    for (size_t v = 0; v < finest.vertexCount(); ++v) {
+        const Vec3i q = moved.position[v] - corner;
+        const auto& [colour, scalars] = expected.at({q.x, q.y, q.z});
+        EXPECT_EQ(finest.colour[v], colour);
+        EXPECT_EQ(finest.scalar[2 * v], scalars[0]);
+        EXPECT_EQ(finest.scalar[2 * v + 1], scalars[1]);
+    }
+    CutRequest request;
+    request.max_triangles = finest.triangleCount() / 4;
+    const Mesh coarse = model->cut(request, budget_).mesh;
+    EXPECT_EQ(coarse.colour.size(), coarse.vertexCount());
 }
 
 TEST_P(BuiltFile, ManyDiamondsLeaveAsLittleAsOne) {

@@ -4,7 +4,7 @@ namespace pietra::pmesh {
 
 void CollapseStore::append(std::span<const CollapseLink> links,
                            std::span<const CollapseRecord> records,
-                           std::span<const uint32_t> number) {
+                           std::span<const uint32_t> number, std::span<const uint32_t> words) {
     std::vector<CollapseShape> shapes;
     std::vector<uint32_t> rings;
     for (const CollapseRecord& r : records) {
@@ -17,11 +17,19 @@ void CollapseStore::append(std::span<const CollapseLink> links,
     links_.append(std::as_bytes(links));
     shapes_.append(std::as_bytes(std::span(shapes)));
     rings_.append(std::as_bytes(std::span(rings)));
+    words_.append(std::as_bytes(words));
     size_ += uint32_t(records.size());
 }
 
+void CollapseStore::readWords(uint32_t i, WordLayout layout, std::vector<uint32_t>& words) const {
+    const size_t had = words.size();
+    words.resize(had + 2 * layout.words());
+    const auto to = std::as_writable_bytes(std::span(words).subspan(had));
+    words_.read(i * to.size(), to);
+}
+
 void CollapseStore::save(StateWriter& state) {
-    for (Spill* spill : {&links_, &shapes_, &rings_, &aliases_}) {
+    for (Spill* spill : {&links_, &shapes_, &rings_, &aliases_, &words_}) {
         spill->save();
         state.put(spill->bytes());
     }
@@ -29,7 +37,7 @@ void CollapseStore::save(StateWriter& state) {
 }
 
 void CollapseStore::restore(StateReader& state) {
-    for (Spill* spill : {&links_, &shapes_, &rings_, &aliases_})
+    for (Spill* spill : {&links_, &shapes_, &rings_, &aliases_, &words_})
         spill->restore(state.get<uint64_t>());
     state.get(size_);
 }

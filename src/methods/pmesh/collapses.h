@@ -31,11 +31,13 @@ public:
         : links_(space, "links"),
           shapes_(space, "shapes"),
           rings_(space, "rings"),
-          aliases_(space, "aliases") {}
+          aliases_(space, "aliases"),
+          words_(space, "words") {}
 
     /// Of one diamond. `number`: of the vertices that the rings mean; in the links, `u` is an id.
+    /// `words`: Recorder::words().
     void append(std::span<const CollapseLink> links, std::span<const CollapseRecord> records,
-                std::span<const uint32_t> number);
+                std::span<const uint32_t> number, std::span<const uint32_t> words = {});
     void append(std::span<const VertexAlias> aliases) { aliases_.append(std::as_bytes(aliases)); }
 
     uint32_t size() const { return size_; }
@@ -45,6 +47,9 @@ public:
     /// By record. For one thread each.
     CachedRecords<CollapseLink> links() const { return CachedRecords<CollapseLink>(links_); }
     CachedRecords<CollapseShape> shapes() const { return CachedRecords<CollapseShape>(shapes_); }
+
+    /// Appends those of a collapse.
+    void readWords(uint32_t i, WordLayout layout, std::vector<uint32_t>& words) const;
 
     /// visit(record, std::span<const uint32_t>), in order, for each ring that is closed.
     template <class Visit>
@@ -80,6 +85,7 @@ private:
     Spill links_, shapes_;
     Spill rings_;  // record, size, numbers
     Spill aliases_;
+    Spill words_;
     uint32_t size_ = 0;
 };
 

@@ -38,10 +38,17 @@ struct VertexState {
 constexpr size_t kStateFloats = sizeof(VertexState) / sizeof(float);
 static_assert(sizeof(VertexState) % sizeof(float) == 0);
 
+/// The first of a vertex's scalars; the input's own come after it.
+const float* stateIn(const Mesh& mesh, size_t v) {
+    return &mesh.scalar[mesh.scalar.size() / mesh.vertexCount() * v];
+}
 VertexState stateOf(const Mesh& mesh, size_t v) {
     VertexState state;
-    std::memcpy(static_cast<void*>(&state), &mesh.scalar[kStateFloats * v], sizeof state);
+    std::memcpy(static_cast<void*>(&state), stateIn(mesh, v), sizeof state);
     return state;
+}
+void setState(Mesh& mesh, size_t v, const VertexState& state) {
+    std::memcpy(const_cast<float*>(stateIn(mesh, v)), &state, sizeof state);
 }
 
 struct Cell {
@@ -61,6 +68,7 @@ struct DiamondResult {
     std::vector<float> errors;
     std::vector<CollapseLink> link;
     std::vector<CollapseRecord> record;
+    std::vector<uint32_t> words;
     // One a vertex that records mean:
     std::vector<VertexState> vertex;
     std::vector<uint8_t> inside;  ///< Recorder::isInside()
@@ -72,7 +80,8 @@ struct DiamondResult {
 /// Merges cells by the names of their vertices and collapses what may be.
 class Collapser {
 public:
-    explicit Collapser(int shift) : shift_(shift) {}
+    explicit Collapser(const VertexTable& vertices)
+        : shift_(vertices.lattice().shift), scalar_range_(vertices.scalarRanges()) {}
 
     void begin() {
         mesh_.clear();
@@ -90,6 +99,7 @@ private:
     void takeApart(const Recorder& recorder, size_t cells, DiamondResult& result);
 
     int shift_;
+    const std::vector<float>& scalar_range_;  // one a scalar of the input
     Simplifier simplifier_;
     SimplifyOutput simplified_;
     Mesh mesh_;
@@ -112,6 +122,11 @@ void Collapser::add(const Mesh& child, bool is_leaf, uint8_t label) {
         }
         mesh_.position.push_back(child.position[v]);
         mesh_.normal.push_back(child.normal[v]);
+        if (!child.colour.empty()) mesh_.colour.push_back(child.colour[v]);
+        const size_t scalars = child.scalar.size() / child.vertexCount(),
+                     own = scalar_range_.size();
+        const auto end = child.scalar.begin() + ptrdiff_t(scalars * (v + 1));
+        mesh_.scalar.insert(mesh_.scalar.end(), end - ptrdiff_t(own), end);
         state_.push_back(state);
     }
     for (size_t t = 0; t < child.triangleCount(); ++t) {
@@ -139,10 +154,13 @@ void Collapser::run(std::span<const uint32_t> quota, float child_error, DiamondR
     input.shift = shift_;
     input.free_error = child_error;
     input.sink = &recorder;
+    input.scalar_count = int(scalar_range_.size());
+    input.scalar_range = scalar_range_;
     simplifier_.run(input, simplified_);
     takeApart(recorder, quota.size(), result);
     result.link = std::move(recorder.links());
     result.record = std::move(recorder.records());
+    result.words = std::move(recorder.words());
     result.vertex = state_;
     for (uint32_t v = 0; v < state_.size(); ++v) result.inside.push_back(recorder.isInside(v));
     result.largest_height = recorder.largestHeight();
@@ -178,9 +196,12 @@ void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult&
                     VertexState state = state_[v];
                     state.history = recorder.historyOf(v);
                     state.number = v;  // of this diamond, until take()
+                    if (!mesh.colour.empty()) cell.colour.push_back(mesh.colour[at]);
+                    const size_t own = scalar_range_.size();
                     cell.scalar.resize(cell.scalar.size() + kStateFloats);
-                    std::memcpy(cell.scalar.data() + cell.scalar.size() - kStateFloats, &state,
-                                sizeof state);
+                    for (size_t i = 0; i < own; ++i)
+                        cell.scalar.push_back(mesh.scalar[own * at + i]);
+                    setState(cell, cell.vertexCount() - 1, state);
                     result.errors[c] = std::max(result.errors[c], state.history.error);
                 }
                 triangle[k] = local_[at];
@@ -205,7 +226,7 @@ public:
           space_(work.space),
           progress_(progress),
           out_(out),
-          workers_([this] { return Collapser(input_.vertices.lattice().shift); }) {}
+          workers_([this] { return Collapser(input_.vertices); }) {}
 
     void run() {
         progress_.beginStage("collapse", input_.leaves.triangles * 3);
@@ -224,6 +245,7 @@ private:
     void runLevel(int level);
     DiamondResult runDiamond(const LevelItem& item, int level);
     void runRoot();
+    int cellScalars() const { return int(kStateFloats + input_.vertices.scalarRanges().size()); }
     static std::string cellsOf(int level) { return fmt::format("cells-{}", level); }
     void save(int level, StateWriter& state);
     int restore(StateReader& state);
@@ -254,7 +276,7 @@ void LevelCollapser::runLevel(int level) {
         const auto found = below_.find(cell);
         return found == below_.end() ? nullptr : &found->second.blob;
     });
-    store_ = std::make_unique<CellStore>(space_, int(kStateFloats), cellsOf(level));
+    store_ = std::make_unique<CellStore>(space_, cellScalars(), cellsOf(level));
     cells_.clear();
     std::vector<LevelItem> diamonds;
     for (const LevelItem& item : items) {
@@ -290,7 +312,7 @@ void LevelCollapser::save(int level, StateWriter& state) {
 int LevelCollapser::restore(StateReader& state) {
     const int level = state.get<int>();
     saved_cells_ = cellsOf(level);
-    store_below_ = std::make_unique<CellStore>(space_, int(kStateFloats), saved_cells_);
+    store_below_ = std::make_unique<CellStore>(space_, cellScalars(), saved_cells_);
     store_below_->restore(state);
     std::vector<SavedCell> cells;
     state.get(cells);
@@ -347,7 +369,7 @@ void LevelCollapser::take(DiamondResult& result) {
         if (link.u != CollapseLink::kNone) link.u = result.vertex[link.u].id();
         for (uint32_t& child : link.child) child = globalRecord(child, first);
     }
-    out_.store.append(result.link, result.record, number);
+    out_.store.append(result.link, result.record, number, result.words);
     out_.store.append(aliases);
     for (size_t c = 0; c < result.ids.size(); ++c) {
         Mesh& mesh = result.cells[c].mesh;
@@ -356,7 +378,7 @@ void LevelCollapser::take(DiamondResult& result) {
             state.history.last = globalRecord(state.history.last, first);
             state.is_shared = result.vertex[state.number].is_shared;
             state.number = number[state.number];
-            std::memcpy(&mesh.scalar[kStateFloats * v], &state, sizeof state);
+            setState(mesh, v, state);
         }
         cells_[result.ids[c]] = {store_->put(result.cells[c]), result.errors[c]};
     }
@@ -369,7 +391,7 @@ void LevelCollapser::take(DiamondResult& result) {
 
 /// What the cells of level 0 have left, down to the base.
 void LevelCollapser::runRoot() {
-    store_ = std::make_unique<CellStore>(space_, int(kStateFloats));
+    store_ = std::make_unique<CellStore>(space_, cellScalars());
     Collapser& worker = workers_.local();
     DiamondResult result;
     std::vector<CellId> cells;
@@ -386,12 +408,15 @@ void LevelCollapser::runRoot() {
     result.ids = {cells.front()};
     take(result);
     out_.base = std::move(result.cells[0].mesh);
+    std::vector<float> scalars;
     for (size_t v = 0; v < out_.base.vertexCount(); ++v) {
         const VertexState state = stateOf(out_.base, v);
         out_.base_vertex.push_back(state.id());
         out_.base_last.push_back(state.history.last);
+        const float* row = stateIn(out_.base, v);
+        scalars.insert(scalars.end(), row + kStateFloats, row + cellScalars());
     }
-    out_.base.scalar.clear();
+    out_.base.scalar = std::move(scalars);
 }
 
 }  // namespace

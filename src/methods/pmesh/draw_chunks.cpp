@@ -70,7 +70,8 @@ size_t DrawChunks::bytes() const {
     size_t bytes = bytesOf(chunk_) + bytesOf(face_) + bytesOf(slice_) + bytesOf(unused_);
     for (const LiveChunk& chunk : chunk_)
         bytes += bytesOf(chunk.mesh.position) + bytesOf(chunk.mesh.normal) +
-                 bytesOf(chunk.mesh.triangle);
+                 bytesOf(chunk.mesh.triangle) + bytesOf(chunk.mesh.colour) +
+                 bytesOf(chunk.mesh.scalar);
     for (const auto* lists : {&face_, &slice_})
         for (const std::vector<uint32_t>& list : *lists) bytes += bytesOf(list);
     return bytes;
@@ -187,11 +188,17 @@ void DrawChunks::make(const ActiveMesh& mesh, uint32_t index) {
         }
     resizeTight(chunk.mesh.position, used.size());
     resizeTight(chunk.mesh.normal, used.size());
+    const WordLayout layout = mesh.source().layout;
+    resizeTight(chunk.mesh.colour, used.size() * layout.colours);
+    resizeTight(chunk.mesh.scalar, used.size() * layout.scalars);
     Box3i box;
     for (size_t i = 0; i < used.size(); ++i) {
         const Vertex& v = mesh.vertex[used[i]];
         chunk.mesh.position[i] = drawnPosition(v, shift);
         chunk.mesh.normal[i] = unpackNormal(v.normal);
+        if (layout.words() > 0)
+            setVertex(mesh.source().wordsOf(mesh.pulse[used[i]].name, mesh.record[used[i]].last),
+                      layout, chunk.mesh, i);
         box.add(chunk.mesh.position[i]);
     }
     const Vec3f centre = 0.5f * (Vec3f(box.min) + Vec3f(box.max));

@@ -105,11 +105,13 @@ private:
 
 void Encoder::makeBase() {
     const Mesh& base = collapses_.base;
+    forest_.layout = WordLayout::of(base);
     forest_.base_triangle = base.triangle;
     forest_.base_operation = packing_.base_operation;
     for (uint32_t v = 0; v < base.vertexCount(); ++v) {
         const Vec3i p = base.position[v] >> forest_.lattice.shift;
         forest_.base_vertex.push_back({p.x, p.y, p.z, packNormal(base.normal[v])});
+        appendWords(base, v, forest_.layout, forest_.base_word);
         setName(collapses_.base_vertex[v], v);
     }
 }
@@ -147,6 +149,7 @@ Encoder::Encoded Encoder::encodeNode(NodeIndex n, std::span<const FromAbove> fro
 /// From slot to slot, as the decoder will.
 void Encoder::refine(Work& work) {
     std::array<uint32_t, 3> next{work.node.frontier, 0, 0};
+    work.node.layout = forest_.layout;
     for (uint32_t s = 0; s < work.slot.size(); ++s) {
         const uint32_t record = work.slot[s].record;
         const CollapseShape r = shapes_[record];
@@ -172,6 +175,8 @@ void Encoder::refine(Work& work) {
         packed.normal = o.normal;
         packed.shift = o.shift;
         work.node.operation.push_back(packed);
+        if (forest_.layout.words() > 0)
+            collapses_.store.readWords(record, forest_.layout, work.node.word);
     }
 }
 

@@ -30,6 +30,7 @@ SimplifyOutput collapseAll(const Mesh& mesh, int shift, Recorder& recorder) {
     input.cell = cell;
     input.quota = quota;
     input.shift = shift;
+    input.scalar_count = int(WordLayout::of(mesh).scalars);
     input.sink = &recorder;
     Simplifier simplifier;
     SimplifyOutput output;
@@ -47,7 +48,7 @@ void takeCollapses(Recorder& recorder, const SimplifyOutput& simplified, Collaps
     std::vector<uint8_t> gone(number.size(), 0);
     for (const CollapseLink& link : recorder.links())
         if (link.u != CollapseLink::kNone) gone[link.u] = 1;
-    out.store.append(recorder.links(), recorder.records(), number);
+    out.store.append(recorder.links(), recorder.records(), number, recorder.words());
     out.base = simplified.mesh;
     out.base_vertex.resize(out.base.vertexCount());
     for (uint32_t v = 0; v < number.size(); ++v)

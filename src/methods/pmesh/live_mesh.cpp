@@ -77,7 +77,8 @@ public:
     std::unique_ptr<LivePage> decode(uint32_t page, std::span<const std::byte> bytes,
                                      std::string& fault) const override {
         auto decoded = std::make_unique<NodePage>();
-        if (!decodeNode(bytes, page, rows_[page], decoded->node, fault)) return nullptr;
+        if (!decodeNode(bytes, page, rows_[page], nodes_.mesh().layout, decoded->node, fault))
+            return nullptr;
         return decoded;
     }
     bool arrive(uint32_t page, const LivePage* decoded) override;
@@ -88,7 +89,7 @@ public:
         return nodes_.prefetch(criterionFor(view, lattice(), pixels), most);
     }
     size_t bytes() const override { return nodes_.bytes() + meshBytes(); }
-    size_t pageBytes() const override { return kNodeBytes; }
+    size_t pageBytes() const override { return nodes_.nodeBytes(); }
     size_t release(size_t bytes) override;
     std::span<const std::string> faults() const override { return faults_; }
 
@@ -97,6 +98,8 @@ private:
     size_t meshBytes() const {
         return base_bytes_ + most_vertices_ * (kActiveBytes + kSortingBytes) + chunks_.bytes();
     }
+    /// Of a vertex, in chunks, of which some have it, too.
+    size_t wordBytes() const { return 6 * nodes_.mesh().layout.words(); }
     size_t roomFor(size_t bytes) const;
     uint64_t drawable(uint64_t triangles) const;
     void describe(const LiveTask& task, const PassCounts& counts, bool drawn_limits);
@@ -126,9 +129,9 @@ bool LiveMesh::arrive(uint32_t page, const LivePage* decoded) {
 size_t LiveMesh::roomFor(size_t bytes) const {
     const size_t vertices = adaption_.mesh().vertexCount();
     const size_t chunks = chunks_.bytes();
-    const size_t others =
-        nodes_.bytes() + base_bytes_ + chunks - std::min(chunks, vertices * kChunkBytes);
-    return (bytes - std::min(bytes, others)) / kVertexBytes;
+    const size_t others = nodes_.bytes() + base_bytes_ + chunks -
+                          std::min(chunks, vertices * (kChunkBytes + wordBytes()));
+    return (bytes - std::min(bytes, others)) / (kVertexBytes + wordBytes());
 }
 
 /// A vertex more is two triangles more, at most.
@@ -153,14 +156,14 @@ const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
                                std::min<size_t>(limits.vertices, vertices + counts.splits)});
     nodes_.note(adaption_);
     const size_t node_room = task.most_bytes - std::min(task.most_bytes, meshBytes());
-    nodes_.setMost((node_room + task.arriving_bytes) / kNodeBytes);
+    nodes_.setMost((node_room + task.arriving_bytes) / nodes_.nodeBytes());
     const Stopwatch watch;
     chunks_.update(adaption_.mesh());
     chunks_ms_ = watch.ms();
 
     describe(task, counts, in_picture <= in_memory);
     if (frame_.short_of_memory) nodes_.evictOldest();
-    const size_t left = nodes_.bytes() - nodes_.loaded() * kNodeBytes +
+    const size_t left = nodes_.bytes() - nodes_.loaded() * nodes_.nodeBytes() +
                         (most_vertices_ - adaption_.mesh().vertexCount()) * kActiveBytes;
     if (frame_.short_of_memory || left > bytes() / 4) giveBack();
     return frame_;
@@ -172,9 +175,9 @@ void LiveMesh::describe(const LiveTask& task, const PassCounts& counts, bool dra
     frame_.busy = !counts.finished || (task.only_look && !is_done);
     frame_.missing = nodes_.missing();
     // What is needed is counted only where it may be too much.
-    frame_.needed_bytes = bytes() + frame_.missing * kNodeBytes;
+    frame_.needed_bytes = bytes() + frame_.missing * nodes_.nodeBytes();
     if (frame_.needed_bytes > task.most_bytes / 2)
-        frame_.needed_bytes = nodes_.required() * kNodeBytes + meshBytes();
+        frame_.needed_bytes = nodes_.required() * nodes_.nodeBytes() + meshBytes();
     frame_.triangles = adaption_.mesh().faceCount();
     const bool is_short = counts.finished && counts.short_of_room;
     frame_.short_of_triangles = is_short && drawn_limits;

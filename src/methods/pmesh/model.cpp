@@ -50,7 +50,8 @@ std::string Model::load(Budget& budget) {
     if (loaded_) return "";
     uint64_t operations = 0;
     for (const NodeRow& row : forest_.row) operations += row.operations;
-    memory_ = budget.reserve(kModelBytes * (operations + forest_.base_vertex.size()),
+    const size_t words = 12 * size_t(forest_.layout.words());  // of both ends, and of a cut
+    memory_ = budget.reserve((kModelBytes + words) * (operations + forest_.base_vertex.size()),
                              "a progressive mesh, whole in memory,");
     forest_.node.resize(forest_.row.size());
     std::vector<std::string> fault(forest_.row.size());
@@ -86,6 +87,11 @@ MeshCut Model::toCut(const ActiveMesh& mesh) const {
         cut.mesh.position.push_back(v.position() * (1 << mesh_.lattice.shift));
         cut.mesh.normal.push_back(unpackNormal(v.normal));
     }
+    const WordLayout layout = mesh_.layout;
+    cut.mesh.colour.resize(mesh.vertexCount() * layout.colours);
+    cut.mesh.scalar.resize(mesh.vertexCount() * layout.scalars);
+    for (size_t v = 0; v < mesh.vertexCount() && layout.words() > 0; ++v)
+        setVertex(mesh_.wordsOf(mesh.pulse[v].name, mesh.record[v].last), layout, cut.mesh, v);
     for (const ActiveFace& f : mesh.face)
         cut.mesh.triangle.push_back({f.vertex[0], f.vertex[1], f.vertex[2]});
     cut.mesh.edge_class.assign(cut.mesh.triangleCount(), 0);
@@ -138,6 +144,7 @@ NodeForest openForest(const ModelReader& reader) {
     };
     NodeForest forest;
     forest.lattice = reader.info().lattice;
+    forest.layout = WordLayout::of(reader.info().schema);
     forest.row = rowsOf(reader.nodes(), forest.lattice.shift);
     if (reader.pageCount() != forest.row.size()) damaged("a page has several nodes");
     std::string fault;
@@ -150,7 +157,7 @@ std::string readNode(const ModelReader& reader, const NodeForest& forest, NodeIn
     thread_local std::vector<std::byte> bytes;
     std::string fault;
     if (!reader.tryReadPage(index, bytes, fault)) return fault;
-    if (decodeNode(bytes, index, forest.row[index], node, fault)) return "";
+    if (decodeNode(bytes, index, forest.row[index], forest.layout, node, fault)) return "";
     return fmt::format("page {} is damaged: {}", index, fault);
 }
 

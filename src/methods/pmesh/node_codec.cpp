@@ -13,14 +13,14 @@ namespace {
 constexpr uint8_t kOperationsCodec = 2;
 
 /// Columns of numbers on their way into or out of bytes.
-template <size_t kCount>
 class Columns {
 public:
-    std::array<std::vector<uint32_t>, kCount> column;
+    std::vector<std::vector<uint32_t>> column;
 
-    void clear() {
+    void begin(size_t count) {
+        column.resize(count);
         for (auto& c : column) c.clear();
-        next_.fill(0);
+        next_.assign(count, 0);
         ok_ = true;
     }
 
@@ -38,7 +38,7 @@ public:
     [[nodiscard]] bool read(ByteReader& reader, uint32_t longest, std::string& fault) {
         for (auto& c : column) c.resize(reader.varintUpTo(longest));
         std::vector<uint8_t> planes;
-        for (size_t i = 0; i < kCount; ++i) planes.push_back(reader.fixed<uint8_t>());
+        for (size_t i = 0; i < column.size(); ++i) planes.push_back(reader.fixed<uint8_t>());
         const size_t count = std::accumulate(planes.begin(), planes.end(), size_t(0));
         if (*std::max_element(planes.begin(), planes.end()) > 4)
             return fault = "its header is not one this version knows", false;
@@ -46,7 +46,7 @@ public:
         StreamUnpacker streams;
         if (!streams.read(reader, count, longest, uint64_t(longest) * count, fault)) return false;
         size_t stream = 0;
-        for (size_t i = 0; i < kCount; ++i) {
+        for (size_t i = 0; i < column.size(); ++i) {
             for (size_t p = 0; p < planes[i]; ++p)
                 if (streams[stream + p].size() != column[i].size())
                     return fault = "its columns have different lengths", false;
@@ -64,13 +64,13 @@ public:
     }
     bool ok() const { return ok_; }
     bool allRead() const {
-        for (size_t i = 0; i < kCount; ++i)
+        for (size_t i = 0; i < column.size(); ++i)
             if (next_[i] != column[i].size()) return false;
         return true;
     }
 
 private:
-    std::array<size_t, kCount> next_{};
+    std::vector<size_t> next_;
     bool ok_ = true;
 };
 
@@ -85,15 +85,17 @@ enum Column : size_t {
     kBefore,               // of dummies referred to from above: the parent's slot, 1 for none
     kDelta,                // six: u's, then what it takes to make v's
     kNormal = kDelta + 6,  // four
-    kColumns = kNormal + 4,
+    kWord = kNormal + 4,   // of a colour eight, then of each scalar two
 };
-using NodeColumns = Columns<kColumns>;
+size_t columnCount(WordLayout layout) {
+    return kWord + 8 * layout.colours + 2 * layout.scalars;
+}
 
 /// One statement of the order and of the predictions for both directions.
 template <bool kDecode>
 class NodeCoder {
 public:
-    NodeCoder(NodeColumns& columns, OperationNode& node) : columns_(columns), node_(node) {}
+    NodeCoder(Columns& columns, OperationNode& node) : columns_(columns), node_(node) {}
 
     /// False only if the columns are not those of a node.
     bool run() {
@@ -127,14 +129,22 @@ private:
         }
     }
 
+    void whole(size_t column, uint32_t& value, uint32_t predicted) {
+        if constexpr (kDecode)
+            value = predicted + unzigzag(columns_.get(column));
+        else
+            columns_.put(column, zigzag(value - predicted));
+    }
+
     void codeOperation(uint32_t s, std::array<uint32_t, 3>& next);
     uint32_t codeChild(uint32_t s, uint32_t end, uint32_t kind, uint32_t level,
                        std::array<uint32_t, 3>& next);
     uint32_t codeBefore(ChildCode before);
     void codeDeltas(NodeOperation& o);
     void codeNormals(NodeOperation& o, uint32_t s);
+    void codeWords(uint32_t s);
 
-    NodeColumns& columns_;
+    Columns& columns_;
     OperationNode& node_;
     Parent parent_;
     std::vector<Parent> above_;  // of slots beyond the frontier, so far
@@ -171,6 +181,7 @@ void NodeCoder<kDecode>::codeOperation(uint32_t s, std::array<uint32_t, 3>& next
     o.structure = StructureWord::of(v, u, level);
     codeDeltas(o);
     codeNormals(o, s);
+    codeWords(s);
 }
 
 template <bool kDecode>
@@ -225,16 +236,43 @@ void NodeCoder<kDecode>::codeNormals(NodeOperation& o, uint32_t s) {
     }
 }
 
-NodeColumns& threadColumns() {
-    thread_local NodeColumns columns;
-    columns.clear();
+/// Colours as normals; scalars, floats of about the same size, by their bits.
+template <bool kDecode>
+void NodeCoder<kDecode>::codeWords(uint32_t s) {
+    const size_t words = node_.layout.words();
+    const bool inside = parent_.slot != kNodeSlots;
+    uint32_t* const v = node_.word.data() + 2 * words * s;
+    const uint32_t* const before =
+        inside  ? node_.word.data() + words * (2 * size_t(parent_.slot) + parent_.end)
+        : s > 0 ? v - 2 * words
+                : nullptr;
+    for (uint32_t byte = 0; byte < 4 * node_.layout.colours; ++byte) {
+        const auto at = [&](uint32_t word) { return word >> (8 * byte) & 255u; };
+        const uint32_t near = before ? at(before[0]) : 0;
+        uint32_t of_v = at(v[0]), of_u = at(v[words]);
+        number<8>(kWord + byte, of_v, near, true);
+        number<8>(kWord + 4 + byte, of_u, inside ? 2 * near - of_v : of_v, true);
+        if (!kDecode) continue;
+        v[0] |= of_v << (8 * byte);
+        v[words] |= of_u << (8 * byte);
+    }
+    for (size_t i = node_.layout.colours; i < words; ++i) {
+        const size_t column = kWord + 8 * node_.layout.colours + 2 * (i - node_.layout.colours);
+        whole(column, v[i], before ? before[i] : 0);
+        whole(column + 1, v[words + i], v[i]);
+    }
+}
+
+Columns& threadColumns(size_t count) {
+    thread_local Columns columns;
+    columns.begin(count);
     return columns;
 }
 
 }  // namespace
 
 std::vector<std::byte> encodeNode(const OperationNode& node) {
-    NodeColumns& columns = threadColumns();
+    Columns& columns = threadColumns(columnCount(node.layout));
     OperationNode copy = node;
     NodeCoder<false>(columns, copy).run();
     std::vector<std::byte> bytes;
@@ -248,14 +286,16 @@ std::vector<std::byte> encodeNode(const OperationNode& node) {
 }
 
 bool decodeNode(std::span<const std::byte> bytes, NodeIndex index, const NodeRow& row,
-                OperationNode& node, std::string& fault) {
+                WordLayout layout, OperationNode& node, std::string& fault) {
     ByteReader reader(bytes);
     if (reader.fixed<uint8_t>() != kOperationsCodec || !reader.ok())
         return fault = "its codec is unknown", false;
     node.operation.assign(reader.varintUpTo(kNodeSlots), {});
     node.frontier = reader.varintUpTo(uint32_t(node.operation.size()));
     for (auto& levels : node.reference_level) levels.clear();
-    NodeColumns& columns = threadColumns();
+    node.layout = layout;
+    node.word.assign(2 * layout.words() * node.operation.size(), 0);
+    Columns& columns = threadColumns(columnCount(layout));
     if (!columns.read(reader, 2 * kNodeSlots, fault)) return false;
     if (!NodeCoder<true>(columns, node).run())
         return fault = "its columns are not those of a node", false;
@@ -265,12 +305,14 @@ bool decodeNode(std::span<const std::byte> bytes, NodeIndex index, const NodeRow
 
 namespace {
 
-using BaseColumns = Columns<8>;  // positions, normals, operations; corners
+/// Positions, normals, operations; corners; words.
+constexpr size_t kBaseCorner = 5, kBaseWord = 8;
 
 }  // namespace
 
 std::vector<std::byte> encodeBase(const NodeForest& forest) {
-    BaseColumns columns;
+    Columns columns;
+    columns.begin(kBaseWord + forest.layout.words());
     Vec3i before{0, 0, 0};
     OperationId next = 0;
     for (size_t v = 0; v < forest.base_vertex.size(); ++v) {
@@ -284,7 +326,9 @@ std::vector<std::byte> encodeBase(const NodeForest& forest) {
         if (o != kNoOperation) next = o + 1;
     }
     for (const Triangle& t : forest.base_triangle)
-        for (size_t k = 0; k < 3; ++k) columns.put(5 + k, t[k]);
+        for (size_t k = 0; k < 3; ++k) columns.put(kBaseCorner + k, t[k]);
+    for (size_t i = 0; i < forest.base_word.size(); ++i)
+        columns.put(kBaseWord + i % forest.layout.words(), forest.base_word[i]);
     std::vector<std::byte> bytes;
     ByteWriter writer(bytes);
     columns.write(writer);
@@ -294,16 +338,19 @@ std::vector<std::byte> encodeBase(const NodeForest& forest) {
 bool decodeBase(std::span<const std::byte> bytes, NodeForest& forest, std::string& fault) {
     constexpr uint32_t kMost = 1u << 28;
     ByteReader reader(bytes);
-    BaseColumns columns;
+    Columns columns;
+    columns.begin(kBaseWord + forest.layout.words());
     if (!columns.read(reader, uint32_t(std::min<uint64_t>(kMost, 4096 * bytes.size())), fault))
         return false;
-    const size_t vertices = columns.column[0].size(), triangles = columns.column[5].size();
+    const size_t vertices = columns.column[0].size(),
+                 triangles = columns.column[kBaseCorner].size();
     for (size_t i = 0; i < columns.column.size(); ++i)
-        if (columns.column[i].size() != (i < 5 ? vertices : triangles))
+        if (columns.column[i].size() != (i >= kBaseCorner && i < kBaseWord ? triangles : vertices))
             return fault = "its columns have different lengths", false;
     forest.base_vertex.clear();
     forest.base_operation.clear();
     forest.base_triangle.clear();
+    forest.base_word.clear();
     std::vector<uint32_t> referred(forest.row.size(), 0);
     std::array<uint32_t, 3> position{};
     OperationId next = 0;
@@ -324,6 +371,8 @@ bool decodeBase(std::span<const std::byte> bytes, NodeForest& forest, std::strin
                 return fault = fmt::format("vertex {} does not know its operation", v), false;
         }
         forest.base_operation.push_back(o);
+        for (size_t i = 0; i < forest.layout.words(); ++i)
+            forest.base_word.push_back(columns.get(kBaseWord + i));
     }
     for (size_t t = 0; t < triangles; ++t) {
         const Triangle corners{columns.get(5), columns.get(6), columns.get(7)};

@@ -20,15 +20,16 @@ namespace pietra::pmesh {
 std::vector<std::byte> encodeNode(const OperationNode& node);
 
 /// Untrusted bytes: false with a sentence in `fault`, never a throw; what is true has no fault by
-/// itself (faultOf()). `row`: with indices known to be good. After a failure `node` is unspecified.
+/// itself (faultOf()). `layout`: the model's. `row`: with indices known to be good. After a failure
+/// `node` is unspecified.
 [[nodiscard]] bool decodeNode(std::span<const std::byte> bytes, NodeIndex index, const NodeRow& row,
-                              OperationNode& node, std::string& fault);
+                              WordLayout layout, OperationNode& node, std::string& fault);
 
 /// The base mesh and its vertices' first operations.
 std::vector<std::byte> encodeBase(const NodeForest& forest);
 
-/// Untrusted bytes, as above. forest.row must be set: each operation is in a root's frontier, each
-/// at most once, and its triangles' corners are there. Sets the base only.
+/// Untrusted bytes, as above. forest.row and forest.layout must be set: each operation is in a
+/// root's frontier, each at most once, and its triangles' corners are there. Sets the base only.
 [[nodiscard]] bool decodeBase(std::span<const std::byte> bytes, NodeForest& forest,
                               std::string& fault);
 

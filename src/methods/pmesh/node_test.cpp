@@ -74,7 +74,9 @@ TEST_P(EachForest, SurvivesItsCodec) {
     std::string fault;
     for (NodeIndex n = 0; n < forest.node.size(); ++n) {
         OperationNode node;
-        ASSERT_TRUE(decodeNode(encodeNode(forest.node[n]), n, forest.row[n], node, fault)) << fault;
+        ASSERT_TRUE(
+            decodeNode(encodeNode(forest.node[n]), n, forest.row[n], forest.layout, node, fault))
+            << fault;
         EXPECT_EQ(node, forest.node[n]);
     }
     NodeForest base;
@@ -223,7 +225,7 @@ TEST(DamagedNode, IsRefusedOrSound) {
             bytes[random() % std::min<size_t>(bytes.size(), random() % 2 ? 100 : 20000)] =
                 std::byte(random());
         OperationNode node;
-        if (!decodeNode(bytes, n, forest.row[n], node, fault)) {
+        if (!decodeNode(bytes, n, forest.row[n], forest.layout, node, fault)) {
             EXPECT_NE(fault, "");
             ++refused;
             continue;

@@ -65,16 +65,23 @@ std::vector<NodeRow> rowsOf(std::span<const Node> table, int lattice_shift) {
 ProgressiveMesh fromNodes(const NodeForest& forest) {
     ProgressiveMesh mesh{
         forest.lattice, forest.base_vertex, forest.base_triangle, forest.base_operation, {}, {}};
+    mesh.layout = forest.layout;
+    mesh.base_word = forest.base_word;
     if (forest.node.empty()) return mesh;
     Operation none{};
     none.child = {kNoOperation, kNoOperation};
     mesh.operation.assign(operationId(NodeIndex(forest.node.size() - 1),
                                       uint32_t(forest.node.back().operation.size())),
                           none);
-    for (NodeIndex n = 0; n < forest.node.size(); ++n)
+    const size_t words = 2 * size_t(forest.layout.words());
+    mesh.word.resize(mesh.operation.size() * words);
+    for (NodeIndex n = 0; n < forest.node.size(); ++n) {
         for (uint32_t s = 0; s < forest.node[n].operation.size(); ++s)
             mesh.operation[operationId(n, s)] =
                 toOperation(n, forest.row[n], forest.node[n].operation[s]);
+        std::ranges::copy(forest.node[n].word,
+                          mesh.word.begin() + ptrdiff_t(words * operationId(n, 0)));
+    }
     return mesh;
 }
 

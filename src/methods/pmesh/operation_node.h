@@ -82,6 +82,8 @@ struct OperationNode {
     uint32_t frontier = 0;
     /// Of the operations referred to in each child node, in the order of their slots.
     std::array<std::vector<uint16_t>, 2> reference_level;
+    WordLayout layout;
+    std::vector<uint32_t> word;  ///< for each operation those of v, then of u
     bool operator==(const OperationNode&) const = default;
 };
 
@@ -116,7 +118,9 @@ struct NodeForest {
     std::vector<Vertex> base_vertex;
     std::vector<Triangle> base_triangle;
     std::vector<OperationId> base_operation;  ///< in slots of roots, or none
-    std::vector<NodeRow> row;                 ///< level by level: parents before children
+    WordLayout layout;
+    std::vector<uint32_t> base_word;
+    std::vector<NodeRow> row;  ///< level by level: parents before children
     std::vector<OperationNode> node;
 };
 

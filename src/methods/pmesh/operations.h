@@ -33,11 +33,13 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "geometry/lattice.h"
 #include "geometry/mesh.h"
+#include "methods/pmesh/vertex_words.h"
 
 namespace pietra::pmesh {
 
@@ -149,18 +151,30 @@ struct ProgressiveMesh {
     std::vector<Operation> operation;
     /// Where only some nodes are in memory: the place of each, counted in nodes, or kNotLoaded.
     /// Empty: all operations lie at their ids.
-    std::vector<uint32_t> place_of_node;
+    std::vector<uint32_t> place_of_node{};
+    WordLayout layout{};
+    std::vector<uint32_t> base_word{};
+    std::vector<uint32_t> word{};  ///< as OperationNode has them, in the places of operations
     static constexpr uint32_t kNotLoaded = ~0u;
 
     uint32_t nameOf(OperationId o) const { return uint32_t(base_vertex.size()) + o; }
     bool isLoaded(OperationId o) const {
         return place_of_node.empty() || place_of_node[o / kNodeSlots] != kNotLoaded;
     }
-    /// It must be loaded.
-    const Operation& at(OperationId o) const {
-        if (place_of_node.empty()) return operation[o];
-        return operation[size_t(place_of_node[o / kNodeSlots]) * kNodeSlots + o % kNodeSlots];
+    uint64_t placeOf(OperationId o) const {
+        return place_of_node.empty()
+                   ? o
+                   : uint64_t(place_of_node[o / kNodeSlots]) * kNodeSlots + o % kNodeSlots;
     }
+    /// Of the vertex `name`, whose last split `last` is loaded, or none.
+    std::span<const uint32_t> wordsOf(uint32_t name, OperationId last) const {
+        const size_t words = layout.words();
+        if (last == kNoOperation) return std::span(base_word).subspan(words * name, words);
+        return std::span(word).subspan(words * (2 * placeOf(last) + size_t(name == nameOf(last))),
+                                       words);
+    }
+    /// It must be loaded.
+    const Operation& at(OperationId o) const { return operation[placeOf(o)]; }
 };
 
 /// What is known of an operation that is not loaded: its level, and criteria that enclose its own.

@@ -34,14 +34,16 @@ Recorder::Recorder(const Mesh& mesh, std::span<const uint8_t> irregular, int shi
       shift_(shift),
       normal_(mesh.normal),
       history_(mesh.vertexCount()),
-      error_before_(mesh.vertexCount(), 0) {}
+      error_before_(mesh.vertexCount(), 0),
+      layout_(WordLayout::of(mesh)) {}
 
 Recorder::Recorder(const Mesh& mesh, std::vector<VertexHistory> history, uint32_t first_record,
                    int shift)
     : shift_(shift),
       normal_(mesh.normal),
       history_(std::move(history)),
-      first_record_(first_record) {
+      first_record_(first_record),
+      layout_(WordLayout::of(mesh)) {
     for (const VertexHistory& h : history_) error_before_.push_back(h.error);
 }
 
@@ -97,7 +99,15 @@ void Recorder::push(uint32_t v, CollapseLink link, CollapseRecord record) {
     record_.push_back(record);
 }
 
+void Recorder::addWords(const CollapseStep& step, uint32_t vertex) {
+    if (layout_.words() == 0) return;
+    step.attributes.resizeOutput(one_, 1);
+    step.attributes.store(vertex, one_, 0);
+    appendWords(one_, 0, layout_, words_);
+}
+
 void Recorder::recordDummy(const CollapseStep& step, uint32_t end) {
+    for (int i = 0; i < 2; ++i) addWords(step, end);
     CollapseRecord r{};
     r.position[0] = stepsOf(step.mesh, step.mesh.point[end].vec());
     r.normal[0] = packNormal(normal_[end]);
@@ -169,6 +179,8 @@ bool Recorder::take(const CollapseStep& step) {
     const float lost = shift == 0 ? 0 : float(1 << (shift - 1)) * float(1 << shift_);
     for (const uint32_t end : {v, u})
         if (lost > 0 && lost > precisionAt(step, end)) recordDummy(step, end);
+    addWords(step, v);
+    addWords(step, u);
     r.height = uint16_t(1 + std::max({highest, heightOf(u), heightOf(v)}));
     r.normal = {packNormal(normal_[v]), packNormal(normal_[u])};
     error_before_[v] = std::max(error_before_[v], error_before_[u]);

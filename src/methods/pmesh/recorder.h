@@ -16,6 +16,7 @@
 
 #include "geometry/bounds.h"
 #include "methods/pmesh/operations.h"
+#include "methods/pmesh/vertex_words.h"
 #include "simplify/collapse_sink.h"
 
 namespace pietra::pmesh {
@@ -86,6 +87,8 @@ public:
     std::vector<CollapseLink>& links() { return link_; }
     const std::vector<CollapseLink>& links() const { return link_; }
     std::vector<CollapseRecord>& records() { return record_; }
+    /// For each record the words of v and of u (of a dummy the same twice) before the collapse.
+    std::vector<uint32_t>& words() { return words_; }
     uint32_t largestHeight() const { return largest_; }
     uint64_t dummies() const { return dummies_; }
     /// Attempts, not edges: an edge may be tried again.
@@ -97,6 +100,7 @@ public:
 
 private:
     float precisionAt(const CollapseStep& step, uint32_t end) const;
+    void addWords(const CollapseStep& step, uint32_t vertex);
     void recordDummy(const CollapseStep& step, uint32_t end);
     void push(uint32_t v, CollapseLink link, CollapseRecord record);
     void gatherRing(const CollapseStep& step, CollapseRecord& record) const;
@@ -112,6 +116,9 @@ private:
     uint32_t first_record_ = 0;
     std::vector<CollapseLink> link_;
     std::vector<CollapseRecord> record_;
+    std::vector<uint32_t> words_;
+    const WordLayout layout_;
+    Mesh one_;  // of one vertex: room for its attributes
     uint32_t largest_ = 0;
     uint64_t dummies_ = 0;
     Refused refused_;

@@ -17,8 +17,11 @@ ResidentNodes::ResidentNodes(NodeForest forest, uint32_t most)
     mesh_.base_vertex = std::move(forest.base_vertex);
     mesh_.base_triangle = std::move(forest.base_triangle);
     mesh_.base_operation = std::move(forest.base_operation);
+    mesh_.layout = forest.layout;
+    mesh_.base_word = std::move(forest.base_word);
     // Memory that is not touched yet costs nothing, and nothing has to move later.
     mesh_.operation.reserve(size_t(most_) * kNodeSlots);
+    mesh_.word.reserve(mesh_.operation.capacity() * wordsOfOne());
     mesh_.place_of_node.assign(row_.size(), ProgressiveMesh::kNotLoaded);
     for (NodeIndex n = 0; n < row_.size(); ++n)
         if (row_[n].parent == kNoNode) {
@@ -157,6 +160,8 @@ bool ResidentNodes::arrive(NodeIndex index, const OperationNode& node) {
     for (size_t s = 0; s < node.operation.size(); ++s)
         mesh_.operation[size_t(place) * kNodeSlots + s] =
             toOperation(index, row_[index], node.operation[s]);
+    mesh_.word.resize(mesh_.operation.size() * wordsOfOne());
+    std::ranges::copy(node.word, mesh_.word.end() - ptrdiff_t(kNodeSlots * wordsOfOne()));
     reference_level_.push_back(node.reference_level);
     node_at_.push_back(index);
     most_at_a_time_ = std::max(most_at_a_time_, loaded());
@@ -174,6 +179,9 @@ bool ResidentNodes::evict(NodeIndex index) {
     if (const size_t last = loaded() - 1; place != last) {
         std::copy_n(&mesh_.operation[last * kNodeSlots], kNodeSlots,
                     &mesh_.operation[size_t(place) * kNodeSlots]);
+        const size_t words = kNodeSlots * wordsOfOne();
+        std::copy_n(mesh_.word.begin() + ptrdiff_t(last * words), words,
+                    mesh_.word.begin() + ptrdiff_t(place * words));
         std::swap(reference_level_[place], reference_level_[last]);
         node_at_[place] = node_at_[last];
         mesh_.place_of_node[node_at_[place]] = place;
@@ -181,6 +189,7 @@ bool ResidentNodes::evict(NodeIndex index) {
     node_at_.pop_back();
     reference_level_.pop_back();
     mesh_.operation.resize(loaded() * kNodeSlots);
+    mesh_.word.resize(mesh_.operation.size() * wordsOfOne());
     mesh_.place_of_node[index] = ProgressiveMesh::kNotLoaded;
     --state_[row_[index].parent].loaded_children;
     return true;
@@ -188,6 +197,7 @@ bool ResidentNodes::evict(NodeIndex index) {
 
 void ResidentNodes::giveBack() {
     giveBackBehind(mesh_.operation);
+    giveBackBehind(mesh_.word);
     most_at_a_time_ = loaded();
 }
 

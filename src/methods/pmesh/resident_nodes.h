@@ -28,7 +28,7 @@
 
 namespace pietra::pmesh {
 
-/// What a node takes, with what it knows of its children.
+/// What a node without colours and scalars takes, with what it knows of its children.
 inline constexpr size_t kNodeBytes = kNodeSlots * (sizeof(Operation) + 4);
 
 class ResidentNodes : public References {
@@ -71,8 +71,10 @@ public:
     size_t required();                                ///< in use or asked for, by the last frame
     size_t missing() const { return asked_.size(); }  ///< asked for by the last frame
 
+    /// What one node takes of this model.
+    size_t nodeBytes() const { return kNodeBytes + kNodeSlots * wordsOfOne() * sizeof(uint32_t); }
     /// What nodes take, those included that have left since the last giveBack().
-    size_t bytes() const { return most_at_a_time_ * kNodeBytes; }
+    size_t bytes() const { return most_at_a_time_ * nodeBytes(); }
     /// Gives the memory of those that have left to the system.
     void giveBack();
 
@@ -86,6 +88,7 @@ private:
     };
     static constexpr uint32_t kFramesKept = 60;  ///< for what is only prefetched
 
+    size_t wordsOfOne() const { return 2 * size_t(mesh_.layout.words()); }
     void pin();
     bool makeRoom();
     bool mayLeave(NodeIndex n) const {
