@@ -384,6 +384,63 @@ class Resume(CommandLineTest):
         process.communicate(timeout=60)
 
 
+class Adaptive(CommandLineTest):
+    """What is particular to models without patches."""
+
+    def test_extraction_stays_within_memory_or_says_what_it_needs(self):
+        write_torus(self.path("torus.ply"), 200, 150)
+        self.build("torus.ply", "t.pietra", "--method", "pmesh")
+        for size, message in (
+                ("64M", r"--memory 64.0 MiB: extracting from this model needs 64.0 MiB at least"),
+                ("70M", r"a progressive mesh, whole in memory, needs 8.\d MiB, but only "
+                        r"\d.\d MiB of the memory limit are left")):
+            run = self.run_pietra("extract", "t.pietra", "-o", "x.ply", "--full", "--memory", size)
+            self.assertEqual((run.returncode, run.stdout), (5, ""), run.stderr)
+            self.assertRegex(run.stderr, "^pietra: " + message + "\n$")
+            self.assertFalse(os.path.exists(self.path("x.ply")))
+        run = self.run_pietra("extract", "t.pietra", "-o", "x.ply", "--full", "--memory", "80M")
+        self.assertEqual(run.returncode, 0, run.stderr)
+
+    def test_colours_survive(self):
+        """Extracted in full, each place has the input's colour."""
+        def vertices(name):
+            head, body = self.read(name).split(b"end_header\n", 1)
+            count = int(head.split(b"element vertex ")[1].split()[0])
+            words = [line.split() for line in head.decode().split("\n")]
+            names = [w[2] for w in words[:words.index(["element", "face", w_faces(head)])]
+                     if w[:1] == ["property"]]
+            code = "<" + "".join("f" if n in ("x", "y", "z", "nx", "ny", "nz") else "B"
+                                 for n in names)
+            rows = struct.iter_unpack(code, body[:struct.calcsize(code) * count])
+            return [dict(zip(names, row)) for row in rows]
+
+        def w_faces(head):
+            return head.split(b"element face ")[1].split()[0].decode()
+
+        side, rows = 40, []
+        for i in range(side * side):
+            x, y = i % side, i // side
+            rows.append(f"{x} {y} {math.sin(x / 5) * math.cos(y / 7):.6f} "
+                        f"{i % 251} {i * 7 % 253} {i * 31 % 255}")
+        faces = [f"3 {a} {a + 1} {a + side}\n3 {a + 1} {a + side + 1} {a + side}"
+                 for a in range(side * (side - 1)) if a % side < side - 1]
+        self.write("sheet.ply", "\n".join(
+            ["ply", "format ascii 1.0", f"element vertex {side * side}", "property float x",
+             "property float y", "property float z", "property uchar red",
+             "property uchar green", "property uchar blue",
+             f"element face {2 * (side - 1) ** 2}", "property list uchar int vertex_indices",
+             "end_header"] + rows + faces) + "\n")
+        self.build("sheet.ply", "s.pietra", "--method", "pmesh", "--leaf-triangles", "200")
+        run = self.run_pietra("extract", "s.pietra", "-o", "full.ply", "--full")
+        self.assertEqual(run.returncode, 0, run.stderr)
+        found = vertices("full.ply")
+        self.assertEqual(len(found), side * side)
+        for v in found:
+            i = round(v["x"]) + side * round(v["y"])
+            self.assertEqual((v["red"], v["green"], v["blue"]),
+                             (i % 251, i * 7 % 253, i * 31 % 255))
+
+
 class Model(CommandLineTest):
     """Verbs that read a model."""
 
