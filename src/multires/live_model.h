@@ -19,6 +19,7 @@
 
 #include "geometry/bounds.h"
 #include "geometry/mesh.h"
+#include "multires/seen_depth.h"
 #include "multires/view.h"
 
 namespace pietra {
@@ -44,7 +45,8 @@ struct LiveChunk {
 
 struct LiveTask {
     const View* view = nullptr;
-    double pixels = 1;  ///< what shows as more is refined; 0: all is
+    const SeenDepth* seen = nullptr;  ///< what it hides may be coarser; null: nothing is hidden
+    double pixels = 1;                ///< what shows as more is refined; 0: all is
     /// For adaption, about; some is always done.
     double milliseconds = std::numeric_limits<double>::infinity();
     bool only_look = false;     ///< nothing is adapted; but what is needed is found

@@ -46,13 +46,16 @@ struct FrameRequest {
     double pixels = 1;   ///< tolerance
     double seconds = 0;  ///< since the beginning, for the prediction of where the camera goes
     Culling culling{true, true, true, true};
+    /// The last picture of all that is drawn: meshes that are adapted need not be as fine where it
+    /// hid them. Must outlive the update; null: nothing is known.
+    const SeenDepth* seen = nullptr;
     bool prefetch = true;
     bool show_error = false;  ///< DrawPatch::value is the error in pixels, not the level
 
     /// Asks for the same cut.
     bool sameView(const FrameRequest& other) const {
         return camera == other.camera && size == other.size && pixels == other.pixels &&
-               culling == other.culling;
+               culling == other.culling && (seen != nullptr) == (other.seen != nullptr);
     }
 };
 

@@ -43,6 +43,7 @@ double SceneMeshes::adapt(uint32_t i, const FrameRequest& request, double pixels
         uploads_fit_ = true;
     }
     LiveTask task{.view = &out.view,
+                  .seen = request.seen,
                   .pixels = pixels,
                   .milliseconds = adapt_ms_ / double(pool_.size()),
                   .only_look = !may_upload_,

@@ -159,6 +159,44 @@ TEST_P(LiveScene, showsTheCutOfTheView) {
     }
 }
 
+TEST_P(LiveScene, showsTheSameThoughWhatIsHiddenIsCoarser) {
+    const ModelReader model(scratch_.file("closed"));
+    const Lattice& lattice = model.info().lattice;
+    Scene scene({&model}, ample());
+    const auto drawn = [&](const Frame& frame) {
+        const ModelPatches shown[] = {{frame.models[0].view, &lattice, frame.models[0].patches}};
+        return draw(shown);
+    };
+    const Vec3d low = lattice.toInput(model.info().bounds.min);
+    const Vec3d high = lattice.toInput(model.info().bounds.max);
+    for (int i = 0; i < 100; i += 17) {
+        FrameRequest request = flight(i, 0.5);
+        request.camera.target = 0.5 * (low + high);  // and all of it is in the picture
+        request.camera.eye = request.camera.target +
+                             1.2 * glm::length(high - low) *
+                                 Vec3d(0.8 * std::cos(0.1 * i), 0.8 * std::sin(0.1 * i), 0.6);
+        const uint64_t all = scene.converge(request).triangles;
+        const Picture picture = drawn(scene.update(request));
+        const MeshTopology expected = topologyOf(welded(scene.update(request).models[0].patches));
+        const SeenDepth seen = seenDepth(request.camera, kSize, picture.depth);
+        request.seen = &seen;
+        const Frame& coarser = scene.converge(request);
+        EXPECT_TRUE(coarser.converged);
+        EXPECT_LT(coarser.triangles, all);
+        EXPECT_EQ(topologyOf(welded(coarser.models[0].patches)), expected);
+        expectSame(picture, drawn(coarser));
+        // A wall before the eye.
+        const std::vector<float> near(picture.depth.size(), 0.01f);
+        const SeenDepth wall = seenDepth(request.camera, kSize, near);
+        request.seen = &wall;
+        const uint64_t hidden = scene.converge(request).triangles;
+        request.seen = nullptr;
+        request.pixels *= 8;
+        EXPECT_LT(double(hidden), 0.5 * double(all));
+        EXPECT_NEAR(double(hidden) / double(scene.converge(request).triangles), 1, 0.15);
+    }
+}
+
 /// From a budget that holds little more than the coarsest mesh to more than all.
 TEST_P(LiveScene, everyFrameIsOneMeshInAnyBudget) {
     for (const char* name : {"closed", "bordered"}) {

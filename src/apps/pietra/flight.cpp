@@ -38,7 +38,9 @@ public:
         const Stopwatch watch;
         for (int i = 0; i < settings_.frames; ++i) {
             if (settings_.real_time) watch.wait(timeOf(i));
-            record_.frames.push_back(frame(request(i)));
+            FrameRequest view = request(i);
+            if (i > 0) view.seen = seenOrNull(seen_);
+            record_.frames.push_back(frame(view));
             record_.frames.back().seconds = timeOf(i);
             record_.frames.back().process_bytes = residentBytes();
             progress(i);
@@ -96,6 +98,7 @@ private:
             record.draw_ms = draw(frame, patchesOf(frame));
             record.gpu_ms = renderer_->gpuMs();
         }
+        if (looks_) seen_ = seenDepth(request.camera, request.size, renderer_->picture().depth);
         record.ms = watch.ms();
         record.triangles = frame.triangles;
         record.patches = frame.patch_count;
@@ -120,6 +123,8 @@ private:
         return lists;
     }
 
+    const SeenDepth* seenOrNull(const SeenDepth& seen) const { return looks_ ? &seen : nullptr; }
+
     double draw(const Frame& frame, const Lists& lists) {
         const Stopwatch watch;
         std::vector<ModelPatches> list;
@@ -132,7 +137,9 @@ private:
 
     void awaitConvergence() {
         const Stopwatch stopped;
+        const SeenDepth seen = seen_;
         FrameRequest last = request(settings_.frames - 1);
+        last.seen = seenOrNull(seen);
         while (stopped.ms() < kMostWaitMs) {
             last.seconds += 1.0 / 60;
             const FrameRecord found = frame(last);
@@ -148,6 +155,10 @@ private:
         for (int i = 0; i < settings_.frames; ++i) {
             FrameRequest view = request(i);
             view.prefetch = false;
+            (void)scene_.converge(view);
+            (void)frame(view);
+            const SeenDepth seen = seen_;
+            view.seen = seenOrNull(seen);
             const Frame& resident = scene_.converge(view);
             // At the flight's own pace: threads that wake up and cold caches are no overhead.
             if (settings_.real_time) watch.wait(timeOf(i));
@@ -185,6 +196,11 @@ private:
     const CameraPath& path_;
     const FlightSettings& settings_;
     std::unique_ptr<LiveRenderer> renderer_;  // null: nothing is drawn
+    // Whether what pictures hide is told to the scene. One model hides little of itself (README of
+    // pmesh); and pictures of several samples have no one depth.
+    const bool looks_ = models_.size() > 1 && settings_.draw == Draw::kCpu &&
+                        settings_.culling.occlusion && settings_.samples == 1;
+    SeenDepth seen_;  // of the last picture
     Scene scene_;
     uint64_t bytes_read_ = 0;
     FlightRecord record_;

@@ -35,6 +35,13 @@ double maxError(const ModelReader& model) {
     return most * model.info().lattice.step;
 }
 
+/// Of all nodes; of a progressive mesh, its operations.
+uint64_t storedVertices(const ModelReader& model) {
+    uint64_t vertices = 0;
+    for (const Node& node : model.nodes()) vertices += node.vertices;
+    return vertices;
+}
+
 double bytesPerTriangle(const ModelReader& model) {
     return double(model.fileBytes()) / double(std::max<uint64_t>(model.info().input_triangles, 1));
 }
@@ -57,6 +64,7 @@ Json infoJson(const ModelReader& model) {
             {"nodes", model.nodes().size()},
             {"pages", model.pageCount()},
             {"triangles_stored", info.triangles_stored},
+            {"vertices_stored", storedVertices(model)},
             {"bytes", model.fileBytes()},
             {"bytes_per_input_triangle", bytesPerTriangle(model)},
             {"max_error", maxError(model)},

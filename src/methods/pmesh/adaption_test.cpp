@@ -79,7 +79,8 @@ TEST_P(Adapted, IsTheClosureOfWhatIsNeededWhateverWasBefore) {
     std::mt19937 random(11);
     Adaption walker(built.mesh), coarse(built.mesh), fine(built.mesh);
     for (int i = 0; i < 12; ++i) {
-        const Criterion view = randomView(random, built.input);
+        Criterion view = randomView(random, built.input);
+        if (i % 2 == 0) view.occlusion = randomOcclusion(random, built.input);
         coarse.settle(nothing());
         fine.settle(everything());
         for (Adaption* adaption : {&walker, &coarse, &fine}) {
@@ -123,9 +124,11 @@ TEST(Criterion, NeedsNoSphereWithinOneThatItDoesNotNeed) {
     const Mesh mesh = onLattice(test::sphereShape(8), 1 << 14);
     std::mt19937 random(16);
     const auto below = [&](uint32_t limit) { return int32_t(random() % limit); };
-    uint32_t inner_needed = 0, outer_only = 0;
+    uint32_t inner_needed = 0, outer_only = 0, hidden = 0;
     for (int i = 0; i < 400; ++i) {
-        const Criterion view = randomView(random, mesh);
+        Criterion view = randomView(random, mesh);
+        const Criterion in_the_open = view;
+        if (i % 2 == 0) view.occlusion = randomOcclusion(random, mesh);
         for (int j = 0; j < 500; ++j) {
             const Vec3i centre(below(1 << 14), below(1 << 14), below(1 << 14));
             const int32_t radius = below(200), range = 1 + below(500);
@@ -141,8 +144,10 @@ TEST(Criterion, NeedsNoSphereWithinOneThatItDoesNotNeed) {
             EXPECT_TRUE(is_outer_needed || !is_needed);
             inner_needed += is_needed;
             outer_only += is_outer_needed && !is_needed;
+            hidden += !is_needed && in_the_open.needs(centre + offset, error, inner);
         }
     }
+    EXPECT_GT(hidden, 500u);
     EXPECT_GT(inner_needed, 1000u);
     EXPECT_GT(outer_only, 1000u);
 }
@@ -155,6 +160,7 @@ TEST(Criterion, DecidesTheSameOfManyVerticesAtOnce) {
     uint32_t needed = 0, close = 0;
     for (int i = 0; i < 2000; ++i) {
         Criterion view = randomView(random, mesh);
+        if (i % 4 == 0) view.occlusion = randomOcclusion(random, mesh);
         for (size_t k = 0; k < 64; ++k) {
             // Some as close to the limit as may be.
             const auto error = uint8_t(1 + random() % 255);

@@ -1,7 +1,8 @@
 #pragma once
 // Which operations a view needs: those whose error, at the point of their sphere nearest to the
 // eye, shows. Outside the picture the tolerance grows with the distance from its pyramid: a sharp
-// cut there would force long chains of splits for nothing but order.
+// cut there would force long chains of splits for nothing but order. What the last picture hid has
+// a larger one, too; it is drawn all the same, and refined as soon as it comes to light.
 //
 // Integers only, so every body of the adaption decides alike; and monotone in error and sphere, so
 // that what saturation ordered stays in order, also where a comparison is close: a sphere within
@@ -11,8 +12,10 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 
 #include "methods/pmesh/active_mesh.h"
+#include "methods/pmesh/occlusion.h"
 #include "multires/view.h"
 
 namespace pietra::pmesh {
@@ -31,12 +34,24 @@ struct Criterion {
     /// Outside the picture by some distance is as if that many times farther away.
     static constexpr int64_t kOutside = 8;
 
+    /// Null: nothing is hidden.
+    std::shared_ptr<const Occlusion> occlusion;
+    /// What is hidden is as if 2^kHiddenBits times farther away.
+    static constexpr int kHiddenBits = 3;
+
     static constexpr int32_t kFarthestEye = 1 << 24, kFarthest = 1 << 25;
 
     bool needs(const Vec3i& centre, uint32_t error, uint32_t radius_code) const {
         const Vec3l d(centre - eye);  // below 2^25 each
         const auto radius = int64_t(decodeRounded<11>(radius_code));
-        const int64_t distance = reach[error] + radius;
+        if (!shows(d, reach[error], radius)) return false;
+        if (!occlusion || shows(d, reach[error] >> kHiddenBits, radius)) return true;
+        // With the error, so that what is coarser there stays behind what hides it.
+        return !occlusion->hides(centre, radius + int64_t(decodeError(error) / 64) + 1);
+    }
+    /// At the tolerance that `reach_of_error` is of.
+    bool shows(const Vec3l& d, int64_t reach_of_error, int64_t radius) const {
+        const int64_t distance = reach_of_error + radius;
         const int64_t squared = d.x * d.x + d.y * d.y + d.z * d.z;
         if (distance * distance <= squared) return false;
         int64_t inside = 0;

@@ -1,6 +1,7 @@
 #include "methods/pmesh/criterion_scan.h"
 
 #include <bit>
+#include <utility>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "methods/pmesh/criterion_scan.cpp"
@@ -115,7 +116,10 @@ HWY_EXPORT(scanCertain);
 
 ScanBits scanVertices(const Criterion& criterion, const Vertex* vertex,
                       const VertexCriteria* criteria, size_t count) {
-    const CertainScan scan = HWY_DYNAMIC_DISPATCH(scanCertain)(criterion, vertex, criteria, count);
+    CertainScan scan = HWY_DYNAMIC_DISPATCH(scanCertain)(criterion, vertex, criteria, count);
+    if (criterion.occlusion)  // then what shows may be hidden
+        for (CertainBits* bits : {&scan.split, &scan.last})
+            bits->open |= std::exchange(bits->yes, 0);
     uint64_t split = scan.split.yes, last = scan.last.yes;
     const uint64_t rest = scan.count < 64 ? ~uint64_t(0) << scan.count : 0;
     const uint64_t all = count < 64 ? (uint64_t(1) << count) - 1 : ~uint64_t(0);

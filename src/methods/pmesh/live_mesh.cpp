@@ -142,7 +142,9 @@ uint64_t LiveMesh::drawable(uint64_t triangles) const {
 }
 
 const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
-    const Criterion criterion = criterionFor(*task.view, lattice(), task.pixels);
+    Criterion criterion = criterionFor(*task.view, lattice(), task.pixels);
+    if (task.seen != nullptr && task.pixels > 0)
+        criterion.occlusion = std::make_shared<Occlusion>(*task.seen, lattice());
     FrameLimits limits;
     // Where much changes, chunks take a part of the time.
     limits.milliseconds = std::max(task.milliseconds - chunks_ms_, task.milliseconds / 4);

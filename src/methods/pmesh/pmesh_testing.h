@@ -122,6 +122,29 @@ inline Criterion randomView(std::mt19937& random, const Mesh& mesh) {
     return criterion;
 }
 
+/// What a camera somewhere around saw: near and far in patches of tiles, some of them open.
+inline std::shared_ptr<const Occlusion> randomOcclusion(std::mt19937& random, const Mesh& mesh) {
+    Box3i box;
+    for (const Vec3i& p : mesh.position) box.add(p);
+    const double size = glm::length(Vec3d(box.max - box.min));
+    std::uniform_real_distribution<double> any(-1, 1);
+    SeenDepth seen;
+    seen.size = {320, 240};
+    seen.camera.target = 0.5 * Vec3d(box.min + box.max) + 0.2 * size * Vec3d(any(random));
+    seen.camera.eye =
+        seen.camera.target + size * glm::normalize(Vec3d(any(random), any(random), any(random)));
+    for (int y = 0; y < seen.rows(); ++y)
+        for (int x = 0; x < seen.columns(); ++x) {
+            const bool is_new = x % 4 == 0 && y % 3 == 0;
+            const auto above = seen.farthest.size() - size_t(y % 3 != 0 ? seen.columns() : 1);
+            seen.farthest.push_back(is_new ? random() % 8 == 0
+                                                 ? std::numeric_limits<float>::infinity()
+                                                 : float(size * (1 + 0.5 * any(random)))
+                                           : seen.farthest[above]);
+        }
+    return std::make_shared<Occlusion>(seen, Lattice());
+}
+
 /// By names, each from its least corner, sorted.
 inline std::vector<Triangle> namedTriangles(const ActiveMesh& mesh) {
     std::vector<Triangle> triangles;

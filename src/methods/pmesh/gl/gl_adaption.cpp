@@ -238,6 +238,7 @@ void GlAdaption::sortInSpace() {
 }
 
 void GlAdaption::begin(const Criterion& criterion) {
+    CHECK(!criterion.occlusion);  // it has not learnt that
     bind();
     wear_.add(lastCounts().operations());
     if (wear_.takeIfOver(size().vertices)) sortInSpace();
