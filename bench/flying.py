@@ -43,30 +43,40 @@ def row(model, path, kind, s, options):
             f"{s['bytes_read'] / 2**20:.1f}", f"{over / 2**20:+.0f}"]
 
 
-def errors(model, options):
-    """Triangles and measured error at each tolerance, medians over frames of the orbit."""
-    path = json.loads(pathlib.Path(options.folder,
-                                   f"{pathlib.Path(model).stem}-orbit-warm.json").read_text())["path"]
+def orbit_of(model, options):
+    """The orbit's keys, as a flight of a few frames reports them."""
+    report = common.report("bench", model, "--path", "orbit", "--size", options.size, "--frames", 2,
+                           "--renderer", "none", "--up", options.up, folder=options.folder)
+    return report["path"]["keys"]
+
+
+def measure(model, options, tolerances=TOLERANCES):
+    """By tolerance: triangles, measured depth error and largest error; medians over frames of the
+    orbit, of the last the largest."""
+    keys = orbit_of(model, options)
     with tempfile.TemporaryDirectory() as folder:
-        found = {t: [] for t in TOLERANCES}
-        for key in path["keys"][5::len(path["keys"]) // options.views]:
+        found = {t: [] for t in tolerances}
+        for key in keys[5::max(len(keys) // options.views, 1)]:
             camera = pathlib.Path(folder, "camera.json")
             camera.write_text(json.dumps({k: v for k, v in key.items() if k != "t"}))
             shot = lambda name, t: common.report(
                 "render", model, "-o", f"{folder}/{name}.png", "--camera", camera, "--size",
                 options.size, "--pixels", t, folder=folder)
             shot("full", 0)
-            for t in TOLERANCES:
+            for t in tolerances:
                 triangles = shot("cut", t)["triangles"]
                 difference = json.loads(common.pietra("compare", f"{folder}/cut.png",
                                                       f"{folder}/full.png", "--json",
                                                       check=False).stdout)
                 found[t].append((triangles, difference["depth_px"]["p99"], max(
                     difference[k]["max"] for k in ("coverage_px", "edge_px", "depth_px"))))
-    for t, views in found.items():
-        triangles, p99, largest = zip(*views)
-        yield [pathlib.Path(model).stem, t, f"{common.median(triangles):,.0f}",
-               f"{common.median(p99):.3f}", f"{max(largest):.2f}"]
+    return {t: (common.median([v[0] for v in views]), common.median([v[1] for v in views]),
+                max(v[2] for v in views)) for t, views in found.items()}
+
+
+def errors(model, options):
+    for t, (triangles, p99, largest) in measure(model, options).items():
+        yield [pathlib.Path(model).stem, t, f"{triangles:,.0f}", f"{p99:.3f}", f"{largest:.2f}"]
 
 
 def main():
