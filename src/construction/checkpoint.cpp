@@ -66,7 +66,8 @@ Checkpoint::~Checkpoint() {
 
 bool Checkpoint::isDue() {
     began_.restart();
-    return !folder_.empty() && since_.seconds() >= std::max(seconds_, cost_seconds_ / kMostCost);
+    const double least = seconds_ > 0 ? std::max(seconds_, cost_seconds_ / kMostCost) : 0;
+    return !folder_.empty() && since_.seconds() >= least;
 }
 
 std::optional<StateReader> Checkpoint::load(const std::string& part) const {

@@ -21,7 +21,8 @@ class Checkpoint {
 public:
     /// `identity`: all that decides the model's bytes; empty: nothing is ever kept. What another
     /// build left is for load() if `resume` is set, else it is removed. `seconds`: at least so much
-    /// time passes from one isDue() to the next. Throws IoError, and UsageError if something is to
+    /// time passes from one isDue() to the next, and the twentyfold of what saving takes; 0: none
+    /// has to. Throws IoError, and UsageError if something is to
     /// be resumed that is being built.
     Checkpoint(const std::string& temp_dir, const std::string& identity, bool resume,
                double seconds);
@@ -35,7 +36,7 @@ public:
     const std::string& folder() const { return folder_; }
     /// Part kFirst was there.
     bool resumes() const { return resumes_; }
-    /// Time to save. Saving costs time as well: a twentieth at most.
+    /// Time to save.
     bool isDue();
     std::optional<StateReader> load(const std::string& part) const;
     void save(const std::string& part, const StateWriter& state);
