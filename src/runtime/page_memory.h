@@ -19,7 +19,7 @@ public:
         PageKey key;
         uint32_t last_used;  ///< frame
     };
-    /// A page used in the last frames leaves only for one that is to be drawn now.
+    /// A page used in the last frames leaves only for one that is needed now.
     static constexpr uint32_t kFramesKept = 60;
 
     explicit PageMemory(size_t bytes) : budget(bytes) {}
@@ -67,7 +67,7 @@ bool PageMemory::makeRoom(size_t bytes, Need need, uint32_t frame, const Candida
     }
     while (!fits(bytes) && !victims_->empty()) {
         const bool too_soon =
-            need != Need::kDraw && victims_->front().last_used + kFramesKept > frame;
+            need == Need::kLater && victims_->front().last_used + kFramesKept > frame;
         if (too_soon) break;
         evict(pop().key);
     }

@@ -208,13 +208,14 @@ bool PagePool::provide(const Wanted& wanted, std::vector<PageKey>& to_load) {
         // Copies that are on their way to the sink will make room.
         const bool for_ever = sink_ == nullptr || (ram_.reserved == 0 && arriving_.empty());
         blocked_ = short_of_ram_ = wanted.need == Need::kDraw && for_ever;
-        missing_ -= wanted.need == Need::kEye;
+        missing_ -= wanted.need == Need::kEye && for_ever;
         return wanted.need == Need::kEye;
     }
     if (to_device) {
         if (!makeRoomToDraw(model.drawn_bytes[key.page], wanted.need)) {
             blocked_ = wanted.need == Need::kDraw;
-            return false;
+            missing_ -= wanted.need == Need::kEye;
+            return wanted.need == Need::kEye;
         }
         device_.reserved += model.drawn_bytes[key.page];
     }

@@ -14,9 +14,9 @@ namespace pietra {
 
 void requirePatches(const ModelReader& model) {
     if (!model.hasPatches())
-        throw InputError(model.path(), "",
-                         fmt::format("models of the method {} cannot be drawn so",
-                                     model.info().method));
+        throw InputError(
+            model.path(), "",
+            fmt::format("models of the method {} cannot be drawn so", model.info().method));
 }
 
 std::vector<PageRun> pageRuns(std::span<const Node> table, std::span<const NodeIndex> nodes) {

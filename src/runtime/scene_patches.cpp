@@ -35,8 +35,10 @@ void ScenePatches::select(uint32_t m, const FrameRequest& request, double pixels
     culling.cone &= !out.two_sided;
     model.refiner.select(out.view, pixels, culling, out.selection);
     for (PageIndex page = 0; page < model.last_used.size(); ++page) {
-        if (model.refiner.used(page)) model.last_used[page] = frame_number_;
-        if (model.residency.resident(page) && model.usedIn(frame_number_, page))
+        const bool used = model.refiner.used(page);
+        if (used) model.last_used[page] = frame_number_;
+        // Not what has just arrived and is not needed any more: that would settle, for a frame.
+        if (model.residency.resident(page) && (used || model.eye_used[page] == frame_number_))
             used_bytes_ += model.drawn_bytes[page];
     }
     for (const PageRequest& r : out.selection.requests) missing_.push_back({{m, r.page}, r.pixels});

@@ -186,7 +186,7 @@ TEST_F(SceneTest, everyFrameIsValidInAnyTwoBudgets) {
 
 TEST_F(SceneTest, whatIsDrawnElsewhereNeedNotFitIntoRam) {
     const ModelReader model(closed_path_);
-    const size_t all = sizeOfAll(model), little = all / 12;
+    const size_t all = sizeOfAll(model), little = all / 16;
     FakeSink sink(all);
     Scene scene({&model}, {tableBytes(model) + little, 2, &sink}), in_ram({&model}, {});
     int outside = 0;
