@@ -13,7 +13,6 @@ void GlLive::draw(std::span<const ModelPatches> models, const LiveSettings& sett
     renderer_.resize(first.view.size(), settings.samples);
     renderer_.begin(first.view, *first.lattice, settings.shade);
     for (const ModelPatches& model : models) {
-    placement_.update();
         renderer_.setModel(model.view, *model.lattice);
         if (settings.leave_out_hidden)
             renderer_.drawUnhidden(model.patches, settings.hidden);
