@@ -155,8 +155,10 @@ private:
         for (int i = 0; i < settings_.frames; ++i) {
             FrameRequest view = request(i);
             view.prefetch = false;
-            (void)scene_.converge(view);
-            (void)frame(view);
+            if (looks_) {
+                (void)scene_.converge(view);
+                (void)frame(view);
+            }
             const SeenDepth seen = seen_;
             view.seen = seenOrNull(seen);
             const Frame& resident = scene_.converge(view);
