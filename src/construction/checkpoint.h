@@ -22,8 +22,7 @@ public:
     /// `identity`: all that decides the model's bytes; empty: nothing is ever kept. What another
     /// build left is for load() if `resume` is set, else it is removed. `seconds`: at least so much
     /// time passes from one isDue() to the next, and the twentyfold of what saving takes; 0: none
-    /// has to. Throws IoError, and UsageError if something is to
-    /// be resumed that is being built.
+    /// has to. Throws IoError, and UsageError if something is to be resumed that is being built.
     Checkpoint(const std::string& temp_dir, const std::string& identity, bool resume,
                double seconds);
     ~Checkpoint();

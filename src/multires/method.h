@@ -53,8 +53,9 @@ struct Method {
     const char* name;     ///< as in --method and in the file
     const char* summary;  ///< one line for --help
     /// Builds a model file from a source. Throws the errors of base/error.h; leaves nothing behind
-    /// when it does, but what resuming takes (construction/checkpoint.h). Stays within settings.memory_bytes. Output bytes depend on the input, the
-    /// precision and the patch sizes alone.
+    /// when it does, but what resuming takes (construction/checkpoint.h). Stays within
+    /// settings.memory_bytes. Output bytes depend on the input, the precision and the patch sizes
+    /// alone.
     BuildReport (*build)(TriangleSource& source, const BuildSettings& settings, Progress& progress);
     /// Errors are proven bounds of the distance to the input; else estimates.
     bool proven;

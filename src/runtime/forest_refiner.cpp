@@ -20,7 +20,7 @@ void ForestRefiner::select(const View& view, double pixels, const Culling& culli
     ++round_;
     for (const NodeIndex root : forest_.roots()) page_used_[forest_.node(root).page] = selects_;
     visit(
-        view, pixels, culling, Missed::kAll,
+        {view, pixels, culling}, Missed::kAll,
         [&](NodeIndex i, double error) {
             selection.draw.push_back(i);
             selection.triangles += forest_.node(i).triangles;
@@ -35,7 +35,7 @@ void ForestRefiner::select(const View& view, double pixels, const Culling& culli
 void ForestRefiner::prefetch(const View& view, double pixels, const Culling& culling,
                              std::vector<PageRequest>& requests) {
     visit(
-        view, pixels, culling, Missed::kFirst, [](NodeIndex, double) {}, [](NodeIndex) {});
+        {view, pixels, culling}, Missed::kFirst, [](NodeIndex, double) {}, [](NodeIndex) {});
     listMissing(requests);
 }
 
@@ -67,7 +67,7 @@ bool ForestRefiner::seenChildrenResident(uint32_t group, const Sight& sight) con
     for (const NodeIndex i : forest_.members(group))
         for (const NodeIndex child : forest_.node(i).child)
             if (child != kNoNode && !residency_.resident(forest_.node(child).page) &&
-                !patchInvisible(forest_.node(child), sight.view, sight.pixels, sight.culling))
+                sight.shows(forest_.node(child)))
                 return false;
     return true;
 }

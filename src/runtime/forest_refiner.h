@@ -51,7 +51,7 @@ public:
     void visitDrawable(const View& view, double pixels, const Visit& visit_node,
                        std::vector<PageRequest>& requests) {
         visit(
-            view, pixels, {}, Missed::kAll, [&](NodeIndex i, double) { visit_node(i); },
+            {view, pixels, {}}, Missed::kAll, [&](NodeIndex i, double) { visit_node(i); },
             [](NodeIndex) {});
         ++round_;
         listMissing(requests);
@@ -65,14 +65,14 @@ private:
     /// Of what is missing: all levels of it, or the first one.
     enum class Missed { kAll, kFirst };
 
-    template <class Draw, class Look>
-    void visit(const View& view, double pixels, const Culling& culling, Missed missed,
-               const Draw& draw, const Look& look);
     struct Sight {
         const View& view;
         double pixels;
-        const Culling& culling;
+        Culling culling;
+        bool shows(const Node& node) const { return !patchInvisible(node, view, pixels, culling); }
     };
+    template <class Draw, class Look>
+    void visit(const Sight& sight, Missed missed, const Draw& draw, const Look& look);
     bool open(uint32_t group, const Sight& sight);
     /// Whatever arrives below it may never be drawn.
     bool isLost(NodeIndex i) const {
@@ -100,9 +100,7 @@ private:
 /// drawn. What is missing goes to `missing_`. Level by level, so that nodes are on their way to the
 /// cache long before they are looked at.
 template <class Draw, class Look>
-void ForestRefiner::visit(const View& view, double pixels, const Culling& culling, Missed missed,
-                          const Draw& draw, const Look& look) {
-    const Sight sight{view, pixels, culling};
+void ForestRefiner::visit(const Sight& sight, Missed missed, const Draw& draw, const Look& look) {
     ++visits_;
     missing_.clear();
     next_level_.clear();
@@ -112,15 +110,14 @@ void ForestRefiner::visit(const View& view, double pixels, const Culling& cullin
         next_level_.clear();
         for (const auto [i, covered, error_above] : level_) {
             const Node& node = forest_.node(i);
-            if (branchInvisible(node, view, pixels, culling)) continue;
+            if (branchInvisible(node, sight.view, sight.pixels, sight.culling)) continue;
             look(i);
-            if (!residency_.resident(node.page) && !patchInvisible(node, view, pixels, culling))
+            if (!residency_.resident(node.page) && sight.shows(node))
                 missing_.push_back({node.page, error_above});
-            const double error = view.errorInPixels(node.error, node.saturated);
-            const bool refine = !node.isLeaf() && !(error <= pixels);
+            const double error = sight.view.errorInPixels(node.error, node.saturated);
+            const bool refine = !node.isLeaf() && !(error <= sight.pixels);
             const bool is_open = refine && !covered && open(forest_.groupOf(i), sight);
-            if (!is_open && !covered && !patchInvisible(node, view, pixels, culling))
-                draw(i, error);
+            if (!is_open && !covered && sight.shows(node)) draw(i, error);
             if (!refine || (covered && (missed == Missed::kFirst || isLost(i)))) continue;
             for (const NodeIndex child : node.child)
                 if (child != kNoNode) {

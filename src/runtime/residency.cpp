@@ -1,7 +1,5 @@
 #include "runtime/residency.h"
 
-#include <algorithm>
-
 #include "base/check.h"
 
 namespace pietra {

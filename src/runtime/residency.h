@@ -2,7 +2,7 @@
 // Which pages of a model are in memory: they come and go in any order. What may be drawn of them in
 // a view, ForestRefiner tells.
 //
-// Memory: 4 bytes a node, 5 a group and 6 a page. Pages arrive and leave in time linear in their
+// Memory: 4 bytes a node, 5 a group and 5 a page. Pages arrive and leave in time linear in their
 // nodes. Not thread-safe.
 
 #include <cstdint>

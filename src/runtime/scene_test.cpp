@@ -34,6 +34,7 @@ protected:
 };
 
 /// Takes a page where it first fits in one piece, now and then has no time, and trusts nobody.
+/// One that is busy refuses every eighth page, too, as if what is free lay in too many places.
 class FakeSink : public PageSink {
 public:
     explicit FakeSink(size_t bytes, double busy = 0) : bytes_(bytes), busy_(busy) {}
@@ -48,7 +49,7 @@ public:
             if (begin + size <= offset) break;
             begin = offset + page.size;
         }
-        if (begin + size > bytes_) {
+        if (begin + size > bytes_ || (busy_ > 0 && ++offered_ % 8 == 0)) {
             ++refused;
             return false;
         }
@@ -84,6 +85,7 @@ private:
 
     const size_t bytes_;
     const double busy_;
+    int offered_ = 0;
     size_t used_ = 0;
     std::map<size_t, Page> pages_;  // by offset
     std::mt19937 random_{1};
