@@ -148,27 +148,39 @@ private:
         }
     }
 
+    /// At the flight's own pace: threads that wake up and cold caches are no overhead. What falls
+    /// behind it, as the repeated draws of overheadRatio() do, is drawn without a rest, and faster.
     void compareWithStaticDraws(const std::function<void(int)>& progress) {
         const Stopwatch watch;
-        std::vector<double> ratios;
-        const int step = std::max(1, settings_.frames / kSampledFrames);
         for (int i = 0; i < settings_.frames; ++i) {
-            FrameRequest view = request(i);
-            view.prefetch = false;
-            if (looks_) {
-                (void)scene_.converge(view);
-                (void)frame(view);
-            }
-            const SeenDepth seen = seen_;
-            view.seen = seenOrNull(seen);
-            const Frame& resident = scene_.converge(view);
-            // At the flight's own pace: threads that wake up and cold caches are no overhead.
+            const Frame& resident = scene_.converge(asSeen(i));
             if (settings_.real_time) watch.wait(timeOf(i));
             record_.frames[i].static_ms = draw(resident, patchesOf(resident));
-            if (i % step == 0) ratios.push_back(overhead(view, resident));
             progress(i);
         }
-        record_.overhead_ratio = percentile(ratios, 0.5);
+        record_.overhead_ratio = overheadRatio();
+    }
+
+    double overheadRatio() {
+        std::vector<double> ratios;
+        const int step = std::max(1, settings_.frames / kSampledFrames);
+        for (int i = 0; i < settings_.frames; i += step) {
+            const FrameRequest view = asSeen(i);
+            ratios.push_back(overhead(view, scene_.converge(view)));
+        }
+        return percentile(ratios, 0.5);
+    }
+
+    /// Frame i, without prefetching, and with what pictures hide from it.
+    FrameRequest asSeen(int i) {
+        FrameRequest view = request(i);
+        view.prefetch = false;
+        if (!looks_) return view;
+        (void)scene_.converge(view);
+        (void)frame(view);
+        asked_ = seen_;
+        view.seen = &asked_;
+        return view;
     }
 
     /// Of the whole frame over the faster of two ways to draw it as a static thing: as one buffer,
@@ -203,6 +215,7 @@ private:
     const bool looks_ = models_.size() > 1 && settings_.draw == Draw::kCpu &&
                         settings_.culling.occlusion && settings_.samples == 1;
     SeenDepth seen_;  // of the last picture
+    SeenDepth asked_;  // of the picture that a frame is compared by
     Scene scene_;
     uint64_t bytes_read_ = 0;
     FlightRecord record_;
