@@ -13,6 +13,8 @@ constexpr int32_t kMinSide = 32;
 /// A tile with less work (in triangles) is not worth the cut.
 constexpr uint64_t kMinWork = 1000;
 constexpr uint64_t kPixelsPerTriangle = 8;  // that cost as much
+/// Every thread keeps a buffer for the largest tile it has drawn, 12 bytes a sample.
+constexpr uint64_t kMostPixels = uint64_t(1) << 17;
 
 uint64_t area(const PixelBox& box) {
     return uint64_t(box.x1 - box.x0) * uint64_t(box.y1 - box.y0);
@@ -116,7 +118,7 @@ Tiling makeTiles(std::span<const DrawChunk> chunks, const PixelBox& screen, size
         DrawTile tile;
         bool operator<(const Entry& other) const { return work < other.work; }
     };
-    // A heap with the costliest tile on top: cut it until there are enough.
+    // A heap with the costliest tile on top: cut it until there are enough, and none is too large.
     std::vector<Entry> heap;
     const auto add = [&](DrawTile tile, const PixelBox& around) {
         addMargins(around, tile.box, tiling.empty);
@@ -127,20 +129,21 @@ Tiling makeTiles(std::span<const DrawChunk> chunks, const PixelBox& screen, size
     DrawTile whole = cutter.makeTile(screen, all);
     if (whole.chunk.empty()) return {{}, {screen}};
     add(std::move(whole), screen);
-    std::vector<DrawTile>& done = tiling.tiles;  // cannot be cut
-    while (!heap.empty() && heap.size() + done.size() < tiles && heap.front().work > kMinWork) {
+    std::vector<DrawTile>& done = tiling.tiles;
+    while (!heap.empty()) {
+        const bool enough = heap.size() + done.size() >= tiles || heap.front().work <= kMinWork;
         std::pop_heap(heap.begin(), heap.end());
-        const DrawTile tile = std::move(heap.back().tile);
+        DrawTile tile = std::move(heap.back().tile);
         heap.pop_back();
-        if (auto halves = cutter.cut(tile)) {
+        std::optional<Cutter::Halves> halves;
+        if (!enough || area(tile.box) > kMostPixels) halves = cutter.cut(tile);
+        if (halves) {
             add(std::move(halves->low), halves->low_box);
             add(std::move(halves->high), halves->high_box);
         } else {
             done.push_back(std::move(tile));
         }
     }
-    std::sort(heap.rbegin(), heap.rend());
-    for (Entry& entry : heap) done.push_back(std::move(entry.tile));
     return tiling;
 }
 

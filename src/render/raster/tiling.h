@@ -22,7 +22,7 @@ struct Tiling {
     std::vector<PixelBox> empty;  ///< that no chunk touches
 };
 
-/// At most so many tiles.
+/// At most so many tiles, and more only where they would be too large (2^17 pixels).
 Tiling makeTiles(std::span<const DrawChunk> chunks, const PixelBox& screen, size_t tiles);
 
 }  // namespace pietra

@@ -65,5 +65,16 @@ TEST(Tiling, WorkIsShared) {
     EXPECT_TRUE(makeTiles({}, kScreen, 8).tiles.empty());
 }
 
+TEST(Tiling, NoTileNeedsALargeBuffer) {
+    std::mt19937 random(3);
+    std::vector<DrawChunk> chunks;
+    for (int i = 0; i < 500; ++i) {
+        const int32_t x = int32_t(random() % 3800), y = int32_t(random() % 2100);
+        chunks.push_back({nullptr, 0, 1, {x, y, x + 40, y + 40}, 0});
+    }
+    for (const DrawTile& tile : makeTiles(chunks, {0, 0, 3840, 2160}, 2).tiles)
+        EXPECT_LE((tile.box.x1 - tile.box.x0) * (tile.box.y1 - tile.box.y0), 1 << 17);
+}
+
 }  // namespace
 }  // namespace pietra
