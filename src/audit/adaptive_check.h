@@ -1,9 +1,9 @@
 #pragma once
 // What `check` does with a model whose pages are not patches (multires/adaptive_model.h): every
 // page and what lies between pages; the model as a whole; seeded cuts, which must have the topology
-// of the coarsest; and, with the input, the finest cut: it states how far the two are apart.
-//
-// Of coarser cuts the certificate says nothing: their errors are estimates so far.
+// of the coarsest; and the certificate: of cuts by error, from the finest to the coarsest, and of
+// the seeded ones, every triangle by what is stated of it, against the input or, without one, the
+// finest cut.
 
 #include "audit/model_check.h"
 #include "multires/adaptive_model.h"

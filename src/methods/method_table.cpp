@@ -15,7 +15,7 @@ namespace {
 constexpr Method kMethods[] = {
     {"tetra", "Adaptive TetraPuzzles: patches in a hierarchy of tetrahedra", tetra::build, true,
      nullptr},
-    {"pmesh", "progressive mesh: refined vertex by vertex, in fewer triangles", pmesh::build, false,
+    {"pmesh", "progressive mesh: refined vertex by vertex, in fewer triangles", pmesh::build, true,
      pmesh::openModel, pmesh::openLive},
 };
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/budget.h"
 #include "geometry/mesh.h"
@@ -24,6 +25,7 @@ struct CutRequest {
 struct MeshCut {
     Mesh mesh;                  ///< lattice units; edge classes are not set
     double max_error = 0;       ///< the largest that is stated of a part of it, lattice units
+    std::vector<float> error;   ///< one a triangle: what is stated of it, at most that
     bool below_finest = false;  ///< asked for less error than the finest states; this is that
     bool over_budget = false;   ///< even the coarsest has more triangles; this is that
 };

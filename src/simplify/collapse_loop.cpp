@@ -14,6 +14,8 @@ constexpr float kLargestShare = 0.25f;
 /// square: a diamond's largest distance is some three times that. 0.5 needs up to a third more
 /// triangles for a given error.
 constexpr float kFreePart = 0.3f;
+/// Candidates between what is being looked at and what is fetched.
+constexpr uint32_t kAhead = 2;
 /// See kMinShape: a height of about 1/600 of the longest edge.
 constexpr float kMinShapeWhenStuck = 3e-6f;
 
@@ -154,11 +156,19 @@ void CollapseLoop::prefetchCandidates() const {
         positions_.prefetch({edges.x[i], edges.y[i], edges.z[i]});
     }
     for (uint32_t i = 0; i < candidates_.count; ++i)
-        for (const uint32_t v : {edges.u[i], edges.v[i]}) {
-            const Fan& fan = mesh_.fan[v];
-            for (uint32_t j = 0; j < fan.count; ++j)
-                __builtin_prefetch(&mesh_.face[mesh_.corner[fan.begin + j] >> 2]);
-        }
+        forFaces(i, [&](uint32_t f) {
+            __builtin_prefetch(&mesh_.face[f]);
+            if (sink_) sink_->expect(f, false);
+        });
+}
+
+/// body(face) for each one around the ends of a candidate, some twice.
+template <class Body>
+void CollapseLoop::forFaces(uint32_t lane, Body&& body) const {
+    for (const uint32_t v : {candidates_.edges.u[lane], candidates_.edges.v[lane]}) {
+        const Fan& fan = mesh_.fan[v];
+        for (uint32_t j = 0; j < fan.count; ++j) body(mesh_.corner[fan.begin + j] >> 2);
+    }
 }
 
 void CollapseLoop::collapseCandidates() {
@@ -167,6 +177,8 @@ void CollapseLoop::collapseCandidates() {
     prefetchCandidates();
     for (uint32_t i = 0; i < candidates_.count && wanted(); ++i) {
         const uint32_t v = candidates_.edges.v[i];
+        if (sink_ && i + kAhead < candidates_.count)
+            forFaces(i + kAhead, [&](uint32_t f) { sink_->expect(f, true); });
         if (!stillThere(candidates_.edges.u[i], v, candidates_.stamp[i])) continue;
         if (collapse(i)) pushEdgesAround(v);
     }

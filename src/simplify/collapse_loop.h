@@ -55,6 +55,8 @@ private:
     void pushEdgesAround(uint32_t v);
     void popCandidates();
     void prefetchCandidates() const;
+    template <class Body>
+    void forFaces(uint32_t lane, Body&& body) const;
     void collapseCandidates();
     bool collapse(uint32_t lane);
     void place(EdgeBatch& edges, uint32_t count) const;

@@ -24,6 +24,9 @@ struct CollapseStep {
 class CollapseSink {
 public:
     virtual ~CollapseSink() = default;
+    /// Faces of a collapse that may soon be offered, to be brought into caches: told twice, the
+    /// second time when what the first call asked for may have come.
+    virtual void expect(uint32_t face, bool again) = 0;
     /// False forbids the collapse; true: it is done next.
     virtual bool take(const CollapseStep& step) = 0;
 };

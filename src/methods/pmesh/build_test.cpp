@@ -7,7 +7,6 @@
 #include <map>
 #include <random>
 
-#include "io/memory_source.h"
 #include "methods/pmesh/model.h"
 #include "methods/pmesh/pmesh_testing.h"
 

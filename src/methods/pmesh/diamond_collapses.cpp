@@ -53,7 +53,8 @@ void setState(Mesh& mesh, size_t v, const VertexState& state) {
 
 struct Cell {
     CellBlob blob;
-    float error = 0;  ///< largest of its vertices
+    float error = 0;  ///< largest of its faces' bounds
+    int height = 0;   ///< 0: a leaf
 };
 
 struct SavedCell {
@@ -72,6 +73,7 @@ struct DiamondResult {
     // One a vertex that records mean:
     std::vector<VertexState> vertex;
     std::vector<uint8_t> inside;  ///< Recorder::isInside()
+    int height = 0;               ///< of the cells
     uint32_t largest_height = 0;
     uint64_t dummies = 0, input_triangles = 0;
     Recorder::Refused refused;
@@ -86,11 +88,13 @@ public:
     void begin() {
         mesh_.clear();
         label_.clear();
+        bound_.clear();
         state_.clear();
         ids_.reserve(0);
     }
-    void add(const Mesh& child, bool is_leaf, uint8_t label);
-    void run(std::span<const uint32_t> quota, float child_error, DiamondResult& result);
+    void add(const CellMesh& cell, bool is_leaf, uint8_t label);
+    void run(std::span<const uint32_t> quota, float child_error, const SurfaceMap::Effort& effort,
+             DiamondResult& result);
     size_t triangleCount() const { return mesh_.triangleCount(); }
 
     CellMesh scratch;
@@ -104,12 +108,14 @@ private:
     SimplifyOutput simplified_;
     Mesh mesh_;
     std::vector<uint8_t> label_;
+    std::vector<float> bound_;  // one a triangle
     std::vector<VertexState> state_;
     KeyMap ids_;
     std::vector<uint32_t> local_;
 };
 
-void Collapser::add(const Mesh& child, bool is_leaf, uint8_t label) {
+void Collapser::add(const CellMesh& cell, bool is_leaf, uint8_t label) {
+    const Mesh& child = cell.mesh;
     local_.resize(child.vertexCount());
     for (size_t v = 0; v < child.vertexCount(); ++v) {
         const VertexState state = is_leaf ? VertexState::at(child.position[v]) : stateOf(child, v);
@@ -134,10 +140,13 @@ void Collapser::add(const Mesh& child, bool is_leaf, uint8_t label) {
         mesh_.triangle.push_back({local_[f[0]], local_[f[1]], local_[f[2]]});
         mesh_.edge_class.push_back(child.edge_class[t]);
         label_.push_back(label);
+        // What the lattice took is no part of it.
+        bound_.push_back(is_leaf ? 0 : cell.bounds.to_original[t]);
     }
 }
 
-void Collapser::run(std::span<const uint32_t> quota, float child_error, DiamondResult& result) {
+void Collapser::run(std::span<const uint32_t> quota, float child_error,
+                    const SurfaceMap::Effort& effort, DiamondResult& result) {
     result.input_triangles = mesh_.triangleCount();
     if (mesh_.triangle.empty()) {
         result.cells.resize(quota.size());
@@ -146,7 +155,7 @@ void Collapser::run(std::span<const uint32_t> quota, float child_error, DiamondR
     }
     std::vector<VertexHistory> history;
     for (const VertexState& state : state_) history.push_back(state.history);
-    Recorder recorder(mesh_, std::move(history), kLocal, shift_);
+    Recorder recorder(mesh_, std::move(history), bound_, effort, kLocal, shift_);
     SimplifyInput input;
     input.mesh = &mesh_;
     input.cell = label_;
@@ -172,6 +181,9 @@ void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult&
     const Mesh& mesh = simplified_.mesh;
     std::vector<uint32_t> survivor(mesh.vertexCount(), kNoVertex);
     std::vector<uint8_t> gone(state_.size(), 0);
+    std::vector<uint32_t> slot(mesh.triangleCount());
+    for (uint32_t t = 0; t < mesh_.triangleCount(); ++t)
+        if (simplified_.triangle_map[t] != kNone) slot[simplified_.triangle_map[t]] = t;
     for (const CollapseLink& link : recorder.links())
         if (link.u != CollapseLink::kNone) gone[link.u] = 1;
     for (uint32_t v = 0; v < state_.size(); ++v)
@@ -202,15 +214,16 @@ void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult&
                     for (size_t i = 0; i < own; ++i)
                         cell.scalar.push_back(mesh.scalar[own * at + i]);
                     setState(cell, cell.vertexCount() - 1, state);
-                    result.errors[c] = std::max(result.errors[c], state.history.error);
                 }
                 triangle[k] = local_[at];
             }
             cell.triangle.push_back(triangle);
             cell.edge_class.push_back(mesh.edge_class[t]);
+            const float bound = recorder.boundOf(slot[t]);
+            result.cells[c].bounds.to_original.push_back(bound);
+            result.errors[c] = std::max(result.errors[c], bound);
         }
-        // The engine's bounds are not for this method.
-        result.cells[c].bounds.to_original.assign(cell.triangleCount(), 0);
+        // One number is for both directions (surface_map.h).
         result.cells[c].bounds.from_original.assign(cell.triangleCount(), 0);
     }
 }
@@ -251,7 +264,12 @@ private:
     int restore(StateReader& state);
     void addCell(const Cell& cell, uint8_t label, Collapser& worker) const {
         cell.blob.store->get(cell.blob, worker.scratch);
-        worker.add(worker.scratch.mesh, cell.blob.store == &input_.store, label);
+        worker.add(worker.scratch, cell.blob.store == &input_.store, label);
+    }
+    /// Half of all collapses are of the finest diamonds, whose errors soon matter little.
+    static SurfaceMap::Effort effortAt(int height) {
+        constexpr std::array<SurfaceMap::Effort, 3> kEffort{{{4, 1}, {4, 0.8f}, {6, 0.6f}}};
+        return kEffort[size_t(std::clamp(height - 1, 0, 2))];
     }
     void take(DiamondResult& result);
     static uint32_t globalRecord(uint32_t record, uint32_t first) {
@@ -342,10 +360,11 @@ DiamondResult LevelCollapser::runDiamond(const LevelItem& item, int level) {
             if (child == below_.end()) continue;
             addCell(child->second, uint8_t(c), worker);
             error = std::max(error, child->second.error);
+            result.height = std::max(result.height, child->second.height + 1);
         }
         quota.push_back(cellQuota(worker.triangleCount() - before, patch_triangles_, level));
     }
-    worker.run(quota, error, result);
+    worker.run(quota, error, effortAt(result.height), result);
     progress_.tick(result.input_triangles);
     return result;
 }
@@ -380,13 +399,14 @@ void LevelCollapser::take(DiamondResult& result) {
             state.number = number[state.number];
             setState(mesh, v, state);
         }
-        cells_[result.ids[c]] = {store_->put(result.cells[c]), result.errors[c]};
+        cells_[result.ids[c]] = {store_->put(result.cells[c]), result.errors[c], result.height};
     }
     out_.largest_height = std::max(out_.largest_height, result.largest_height);
     out_.dummies += result.dummies;
     out_.refused.irregular += result.refused.irregular;
     out_.refused.valence += result.refused.valence;
     out_.refused.level += result.refused.level;
+    out_.refused.unseen += result.refused.unseen;
 }
 
 /// What the cells of level 0 have left, down to the base.
@@ -402,9 +422,10 @@ void LevelCollapser::runRoot() {
     for (const CellId id : cells) {
         addCell(below_[id], 0, worker);
         error = std::max(error, below_[id].error);
+        result.height = std::max(result.height, below_[id].height + 1);
     }
     const uint32_t nothing = 0;
-    worker.run({&nothing, 1}, error, result);
+    worker.run({&nothing, 1}, error, effortAt(result.height), result);
     result.ids = {cells.front()};
     take(result);
     out_.base = std::move(result.cells[0].mesh);

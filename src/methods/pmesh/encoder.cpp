@@ -16,6 +16,20 @@ uint32_t lengthOf(const Vec3i& v) {
     return uint32_t(std::ceil(std::sqrt(glm::dot(d, d))));
 }
 
+/// Of a triangle, the bound is one operation's, and the rounding of its corners that of others: so
+/// in an error e a part is for rounding only, and the rest for the bound, both not falling with e.
+/// Rounding grows as edges do, the bound as their squares. In steps: kMuch of what is below kFew,
+/// kLittle of what is above.
+constexpr double kMuch = 1.0 / 5, kLittle = 1.0 / 16, kFew = 32;
+
+/// The least error that has room for both.
+double errorFor(double bound, double rounding) {
+    const auto least = [](double much, double little, double part) {
+        return part <= much * kFew ? part / much : kFew + (part - much * kFew) / little;
+    };
+    return std::max(least(1 - kMuch, 1 - kLittle, bound), least(kMuch, kLittle, rounding));
+}
+
 /// Of an error in steps.
 uint8_t errorCode(double error) {
     const uint64_t units = std::max<uint64_t>(uint64_t(std::ceil(error / kErrorUnit)), 1);
@@ -25,6 +39,7 @@ uint8_t errorCode(double error) {
 /// What the operations that a node refers to in a child know from above...
 struct FromAbove {
     Vec3i centre;
+    double rounding;   ///< how far the centre is from where it was recorded
     ChildCode before;  ///< if it is a dummy
 };
 /// ...and tell.
@@ -57,7 +72,7 @@ public:
             const OperationId o = forest_.base_operation[v];
             if (o == kNoOperation) continue;
             roots.resize(std::max<size_t>(roots.size(), nodeOf(o) + 1));
-            roots[nodeOf(o)].push_back({forest_.base_vertex[v].position(), kNoChildCode});
+            roots[nodeOf(o)].push_back({forest_.base_vertex[v].position(), 0, kNoChildCode});
         }
         if (roots.empty()) roots.emplace_back();  // of the one node that there is at least
         for (NodeIndex n = 0; n < roots.size(); ++n) encodeNode(n, roots[n]);
@@ -87,7 +102,7 @@ private:
     void makeBase();
     Encoded encodeNode(NodeIndex n, std::span<const FromAbove> frontier);
     void refine(Work& work);
-    Operation encodeOperation(uint32_t record, const CollapseShape& r, const Vec3i& from);
+    Operation encodeOperation(uint32_t record, const CollapseShape& r, const FromAbove& above);
     void setRanks(Operation& o, uint32_t record, const CollapseShape& r);
     void setOffsets(Operation& o, const CollapseShape& r, const Vec3i& from, uint32_t kinds) const;
     static void saturate(Work& work);
@@ -154,7 +169,7 @@ void Encoder::refine(Work& work) {
         const uint32_t record = work.slot[s].record;
         const CollapseShape r = shapes_[record];
         const FromAbove above = work.above[s];
-        Operation o = encodeOperation(record, r, above.centre);
+        Operation o = encodeOperation(record, r, above);
         if (!o.isDummy()) setOffsets(o, r, above.centre, work.slot[s].kinds);
         std::array<ChildCode, 2> code{kNoChildCode, o.isDummy() ? above.before : kNoChildCode};
         for (const int end : {0, 1}) {
@@ -162,10 +177,11 @@ void Encoder::refine(Work& work) {
             if (kind == 0) continue;
             code[size_t(end)] = (kind - 1) * kNodeSlots + next[kind - 1]++;
             const Vec3i centre = above.centre + o.offset(end);
+            const double rounding = glm::distance(Vec3d(centre), Vec3d(r.position[size_t(end)]));
             if (kind == 1)
-                work.above.push_back({centre, s});
+                work.above.push_back({centre, rounding, s});
             else
-                work.children[kind - 2].push_back({centre, kNodeSlots + s});
+                work.children[kind - 2].push_back({centre, rounding, kNodeSlots + s});
         }
         work.operation.push_back(o);
         NodeOperation packed;
@@ -180,25 +196,25 @@ void Encoder::refine(Work& work) {
     }
 }
 
-Operation Encoder::encodeOperation(uint32_t record, const CollapseShape& r, const Vec3i& from) {
+Operation Encoder::encodeOperation(uint32_t record, const CollapseShape& r,
+                                   const FromAbove& above) {
     Operation o{};
     o.level = uint16_t(collapses_.largest_height - r.height);
     o.normal = r.normal;
     o.radius = uint16_t(encodeRoundedUp<11>(r.radius));
-    o.error = errorCode(double(r.error) / step_);
+    o.error = errorCode(errorFor(double(r.error) / step_, above.rounding));
     if (r.ring_size > 0) {
         setRanks(o, record, r);
         return o;
     }
     // A dummy: to where the vertex is to be, as far as sixteen bits reach.
     o.ranks = Operation::kDummyRanks;
-    const Vec3i offset = glm::clamp(r.position[0] - from, -32768, 32767);
+    const Vec3i offset = glm::clamp(r.position[0] - above.centre, -32768, 32767);
     for (int k = 0; k < 3; ++k) {
         o.delta[0][size_t(k)] = int8_t(offset[k] >> 8);
         o.delta[1][size_t(k)] = int8_t(offset[k] & 0xff);
     }
     o.radius = uint16_t(encodeRoundedUp<11>(lengthOf(offset)));
-    o.error = std::max(o.error, errorCode(lengthOf(offset)));
     return o;
 }
 

@@ -22,7 +22,7 @@ public:
 
 private:
     std::string load(Budget& budget);
-    double errorOf(const ActiveMesh& mesh) const;
+    double errorOf(uint32_t code) const;
     void refineTo(uint64_t max_triangles, std::unique_ptr<Adaption>& adaption) const;
     MeshCut toCut(const ActiveMesh& mesh) const;
 
@@ -73,16 +73,14 @@ std::string Model::modelFault(Budget& budget) {
     return load(budget);
 }
 
-double Model::errorOf(const ActiveMesh& mesh) const {
-    uint32_t code = 0;
-    for (const VertexCriteria& c : mesh.criteria) code = std::max<uint32_t>(code, c.split_error);
+double Model::errorOf(uint32_t code) const {
     return double(decodeError(code)) * kErrorUnit * double(1 << mesh_.lattice.shift) +
            double(reader_.info().quantisation_error);
 }
 
 MeshCut Model::toCut(const ActiveMesh& mesh) const {
     MeshCut cut;
-    cut.max_error = errorOf(mesh);
+    cut.max_error = errorOf(0);
     for (const Vertex& v : mesh.vertex) {
         cut.mesh.position.push_back(v.position() * (1 << mesh_.lattice.shift));
         cut.mesh.normal.push_back(unpackNormal(v.normal));
@@ -92,8 +90,15 @@ MeshCut Model::toCut(const ActiveMesh& mesh) const {
     cut.mesh.scalar.resize(mesh.vertexCount() * layout.scalars);
     for (size_t v = 0; v < mesh.vertexCount() && layout.words() > 0; ++v)
         setVertex(mesh_.wordsOf(mesh.pulse[v].name, mesh.record[v].last), layout, cut.mesh, v);
-    for (const ActiveFace& f : mesh.face)
+    for (const ActiveFace& f : mesh.face) {
         cut.mesh.triangle.push_back({f.vertex[0], f.vertex[1], f.vertex[2]});
+        uint32_t code = 0;
+        for (size_t k = 0; k < 3; ++k)
+            code = std::max<uint32_t>(code, mesh.criteria[f.vertex[k]].split_error);
+        const double error = errorOf(code);
+        cut.max_error = std::max(cut.max_error, error);
+        cut.error.push_back(float(error));
+    }
     cut.mesh.edge_class.assign(cut.mesh.triangleCount(), 0);
     return cut;
 }

@@ -11,7 +11,9 @@
 #include <set>
 #include <vector>
 
+#include "io/memory_source.h"
 #include "methods/pmesh/adaption.h"
+#include "methods/pmesh/build.h"
 #include "methods/pmesh/in_core_builder.h"
 #include "simplify/test_meshes.h"
 
@@ -87,6 +89,26 @@ inline Built buildFor(const Mesh& input) {
     built.forest = buildInCore(input, Lattice{}, budget, &built.counts);
     built.mesh = fromNodes(built.forest);
     return built;
+}
+
+/// By diamonds, into a file; positions are the lattice.
+inline BuildReport buildFile(const Mesh& mesh, uint32_t leaf_triangles, const std::string& path) {
+    std::vector<Vec3d> positions;
+    for (const Vec3i& p : mesh.position) positions.push_back(Vec3d(p));
+    std::vector<MemorySource::Index> triangles;
+    for (const Triangle& t : mesh.triangle) triangles.push_back({t[0], t[1], t[2]});
+    MemorySource source(positions, triangles);
+    BuildSettings settings;
+    settings.output = path;
+    settings.force = true;
+    settings.memory_bytes = size_t(256) << 20;
+    settings.jobs = 2;
+    settings.temp_dir = ::testing::TempDir();
+    settings.leaf_triangles = leaf_triangles;
+    settings.patch_triangles = leaf_triangles;
+    settings.precision = {PrecisionSetting::Kind::kStep, 1.0};
+    Progress progress;
+    return build(source, settings, progress);
 }
 
 inline Criterion everything() {

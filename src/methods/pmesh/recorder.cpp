@@ -34,18 +34,19 @@ Recorder::Recorder(const Mesh& mesh, std::span<const uint8_t> irregular, int shi
       shift_(shift),
       normal_(mesh.normal),
       history_(mesh.vertexCount()),
-      error_before_(mesh.vertexCount(), 0),
+      map_(std::vector<float>(mesh.triangleCount(), 0), {}),
       layout_(WordLayout::of(mesh)) {}
 
-Recorder::Recorder(const Mesh& mesh, std::vector<VertexHistory> history, uint32_t first_record,
-                   int shift)
+Recorder::Recorder(const Mesh& mesh, std::vector<VertexHistory> history,
+                   const std::vector<float>& bound, const SurfaceMap::Effort& effort,
+                   uint32_t first_record, int shift)
     : shift_(shift),
       normal_(mesh.normal),
       history_(std::move(history)),
+      map_(bound, effort),
+      largest_error_(*std::max_element(bound.begin(), bound.end())),
       first_record_(first_record),
-      layout_(WordLayout::of(mesh)) {
-    for (const VertexHistory& h : history_) error_before_.push_back(h.error);
-}
+      layout_(WordLayout::of(mesh)) {}
 
 Vec3i Recorder::stepsOf(const WorkingMesh& mesh, const Vec3f& p) const {
     return (mesh.centre + Vec3i(p)) >> shift_;
@@ -142,6 +143,40 @@ void Recorder::gatherRing(const CollapseStep& step, CollapseRecord& r) const {
     if (!r.closed) r.ring[r.ring_size++] = ring.previous[i];
 }
 
+/// Bounds of the faces that the collapse makes. False: it must not be.
+bool Recorder::mapOn(const CollapseStep& step, const CollapseRecord& r) {
+    const WorkingMesh& mesh = step.mesh;
+    CollapsingStar star;
+    star.size = r.ring_size;
+    star.closed = r.closed;
+    star.merged = step.to;
+    star.end = {mesh.point[step.v].vec(), mesh.point[step.u].vec()};
+    star.on_border = {mesh.point[step.v].rank() != kRankFree,
+                      mesh.point[step.u].rank() != kRankFree};
+    const auto placeInRing = [&](uint32_t w) {
+        return uint32_t(std::find(r.ring.begin(), r.ring.begin() + r.ring_size, w) -
+                        r.ring.begin());
+    };
+    for (uint32_t i = 0; i < r.ring_size; ++i) star.ring[i] = mesh.point[r.ring[i]].vec();
+    for (uint32_t i = 0; i < step.ring.size; ++i) {
+        const uint32_t edge = placeInRing(step.ring.next[i]);
+        CHECK_LT(edge, star.edges());
+        star.face[edge] = step.ring.corner[i] >> 2;
+        star.apex[edge] = step.ring.corner[i] & 3;
+        star.of_u[edge] = step.ring.apex[i] == step.u;
+    }
+    for (const Wing& w : step.wing) {
+        CollapsingStar::Wing& wing = star.wing[star.wings++];
+        wing.face = w.face;
+        wing.ring = placeInRing(w.vertex);
+        const auto& corner = mesh.face[w.face].v;
+        for (uint32_t k = 0; k < 3; ++k)
+            wing.corner[corner[k] == step.v ? 0 : corner[k] == step.u ? 1 : 2] = k;
+    }
+    const float stated = std::max(history_[step.u].error, history_[step.v].error);
+    return map_.collapse(star, stated, largest_error_);
+}
+
 bool Recorder::take(const CollapseStep& step) {
     const uint32_t u = step.u, v = step.v;
     for (size_t w = inside_.size(); w < history_.size(); ++w)
@@ -168,6 +203,9 @@ bool Recorder::take(const CollapseStep& step) {
         CHECK_LT(rank, r.ring_size);
         (face.v[kNextCorner[k]] == u ? r.left : r.right) = rank;
     }
+    if (!mapOn(step, r)) return ++refused_.unseen, false;
+    const float error = map_.largestOfLast();
+    largest_error_ = std::max(largest_error_, error);
     const Vec3i to = stepsOf(step.mesh, step.to);
     r.position = {stepsOf(step.mesh, step.mesh.point[v].vec()),
                   stepsOf(step.mesh, step.mesh.point[u].vec())};
@@ -183,9 +221,8 @@ bool Recorder::take(const CollapseStep& step) {
     addWords(step, u);
     r.height = uint16_t(1 + std::max({highest, heightOf(u), heightOf(v)}));
     r.normal = {packNormal(normal_[v]), packNormal(normal_[u])};
-    error_before_[v] = std::max(error_before_[v], error_before_[u]);
     normal_[v] = encodeNormal(decodeNormal(normal_[v]) + decodeNormal(normal_[u]));
-    push(v, {u, {history_[v].last, history_[u].last}, 1, step.deviation + error_before_[v], {}}, r);
+    push(v, {u, {history_[v].last, history_[u].last}, 1, error, {}}, r);
     return true;
 }
 

@@ -16,6 +16,7 @@
 
 #include "geometry/bounds.h"
 #include "methods/pmesh/operations.h"
+#include "methods/pmesh/surface_map.h"
 #include "methods/pmesh/vertex_words.h"
 #include "simplify/collapse_sink.h"
 
@@ -29,8 +30,10 @@ struct CollapseLink {
     uint64_t u = kNone;  ///< a vertex: by its place in the recorder's mesh; of a dummy none
     std::array<uint32_t, 2> child;  ///< the records that v and u came from, or kNoOperation
     uint32_t operations = 1;        ///< it and all below
-    float error = 0;                ///< lattice units, an estimate; no less than those below
-    Box3i box;                      ///< of where it and all below bring vertices, in steps
+    /// Lattice units: the largest bound (surface_map.h) of the faces that this made; no less than
+    /// those below.
+    float error = 0;
+    Box3i box;  ///< of where it and all below bring vertices, in steps
 };
 
 /// The rest, as encoding sees it. Positions in steps, and as they were before the collapse.
@@ -69,18 +72,21 @@ struct VertexHistory {
 class Recorder : public CollapseSink {
 public:
     struct Refused {
-        uint64_t irregular = 0, valence = 0, level = 0;
+        uint64_t irregular = 0, valence = 0, level = 0, unseen = 0;
     };
 
     /// `mesh`: the one that is simplified; `irregular`: one a vertex, as HalfEdges has it, or empty
     /// where such have the rank kRankFixed; both must outlive this. Positions are multiples of
     /// 2^shift.
     Recorder(const Mesh& mesh, std::span<const uint8_t> irregular, int shift);
-    /// Goes on where others ended: `history` is that of the vertices, one each; records of this one
-    /// are counted from `first_record` on.
-    Recorder(const Mesh& mesh, std::vector<VertexHistory> history, uint32_t first_record,
-             int shift);
+    /// Goes on where others ended: `history` is that of the vertices, one each, `bound` that of the
+    /// faces; records of this one are counted from `first_record` on.
+    Recorder(const Mesh& mesh, std::vector<VertexHistory> history, const std::vector<float>& bound,
+             const SurfaceMap::Effort& effort, uint32_t first_record, int shift);
 
+    void expect(uint32_t face, bool again) override {
+        again ? map_.expectPieces(face) : map_.expect(face);
+    }
     bool take(const CollapseStep& step) override;
 
     /// As many links as records; children before parents.
@@ -93,6 +99,8 @@ public:
     uint64_t dummies() const { return dummies_; }
     /// Attempts, not edges: an edge may be tried again.
     const Refused& refused() const { return refused_; }
+    /// Of a face of the mesh that was not removed.
+    float boundOf(uint32_t face) const { return map_.bound(face); }
     /// Has all its triangles in this mesh. Known only once a collapse was offered; else false.
     bool isInside(uint32_t v) const { return !inside_.empty() && inside_[v]; }
     const VertexHistory& historyOf(uint32_t v) const { return history_[v]; }
@@ -104,6 +112,7 @@ private:
     void recordDummy(const CollapseStep& step, uint32_t end);
     void push(uint32_t v, CollapseLink link, CollapseRecord record);
     void gatherRing(const CollapseStep& step, CollapseRecord& record) const;
+    bool mapOn(const CollapseStep& step, const CollapseRecord& record);
     uint32_t heightOf(uint32_t v) const { return history_[v].height; }
     Vec3i stepsOf(const WorkingMesh& mesh, const Vec3f& p) const;
 
@@ -112,7 +121,8 @@ private:
     std::vector<OctNormal> normal_;
     std::vector<VertexHistory> history_;
     std::vector<uint8_t> inside_;
-    std::vector<float> error_before_;  // of what a vertex stands for, before this began
+    SurfaceMap map_;
+    float largest_error_ = 0;  // of any face, ever
     uint32_t first_record_ = 0;
     std::vector<CollapseLink> link_;
     std::vector<CollapseRecord> record_;
