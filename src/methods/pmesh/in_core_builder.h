@@ -10,7 +10,7 @@
 
 namespace pietra::pmesh {
 
-inline constexpr size_t kBuildBytes = 240;
+inline constexpr size_t kBuildBytes = 800;
 
 /// `mesh`: welded, without degenerate or doubled triangles, with normals, all positions multiples
 /// of 2^lattice.shift; its edge classes are set here.

@@ -356,26 +356,25 @@ void SurfaceMap::give(uint32_t edge, const Polygon& part) {
     if (part.size < 3) return;
     if (part.size > kMostCut) return void(overflow_ = true);
     const Sector& sector = sector_[edge];
-    Polygon placed;
-    placed.size = part.size;
+    std::array<Lanes4, 4> weights[kMostCut / 4];  // as a piece has them, by columns
     Points4 from[kMostCut / 4], to[kMostCut / 4];
     Lanes4 largest_sq{};
     for (uint32_t k = 0; k < part.size; k += 4) {
-        Lanes4* const c = &placed.corner[k];
-        for (uint32_t n = 0; n < 4; ++n) c[n] = part.corner[k + n < part.size ? k + n : 0];
-        Lanes4 s = c[0], t = c[1], x = c[2], y = c[3];
+        auto& [s, t, wi, wj] = weights[k / 4];
+        s = part.corner[k];
+        t = part.corner[k + 1 < part.size ? k + 1 : 0];
+        Lanes4 x = part.corner[k + 2 < part.size ? k + 2 : 0];
+        Lanes4 y = part.corner[k + 3 < part.size ? k + 3 : 0];
         transpose(s, t, x, y);
         const Lanes4 shorter = x * sector.to_shorter.x + y * sector.to_shorter.y;
         x -= shorter * sector.shorter.x;
         y -= shorter * sector.shorter.y;
         const Lanes4 longer = x * sector.to_longer.x + y * sector.to_longer.y;
-        Lanes4 wi = sector.second_is_longer ? shorter : longer;
-        Lanes4 wj = sector.second_is_longer ? longer : shorter;
+        wi = sector.second_is_longer ? shorter : longer;
+        wj = sector.second_is_longer ? longer : shorter;
         from[k / 4] = Points4::at(from_.origin, from_.edge[0], s, from_.edge[1], t);
         to[k / 4] = Points4::at(Vec3f(0), sector.edge[0], wi, sector.edge[1], wj);
         largest_sq = maxLanes(largest_sq, squaredDistance(from[k / 4], to[k / 4]));
-        transpose(s, t, wi, wj);
-        c[0] = s, c[1] = t, c[2] = wi, c[3] = wj;
     }
     const float limit = this->limit();
     float bound = from_.rest + std::sqrt(largestLane(largest_sq)) + slack_;
@@ -396,10 +395,18 @@ void SurfaceMap::give(uint32_t edge, const Polygon& part) {
     }
     bound *= 1 + 0x1p-20f;
     largest_ = std::max(largest_, bound);
-    if (bound <= limit)
+    if (bound <= limit) {
         sector_[edge].rest = std::max(sector_[edge].rest, bound);
-    else
-        keep(edge, placed, bound);
+        return;
+    }
+    Polygon placed;
+    placed.size = part.size;
+    for (uint32_t k = 0; k < part.size; k += 4) {
+        auto& [a, b, c, d] = weights[k / 4];
+        transpose(a, b, c, d);
+        std::copy_n(weights[k / 4].data(), 4, &placed.corner[k]);
+    }
+    keep(edge, placed, bound);
 }
 
 void SurfaceMap::keep(uint32_t edge, const Polygon& part, float bound) {

@@ -17,7 +17,7 @@
 // stated there anyhow. All others are the *rest* of a face: one number, for all of the face.
 //
 // The result is a function of the collapses. Single precision, relative to the merged vertex; slack
-// pays for rounding. Memory: 24 bytes a face, and 150 a piece, of which most faces have none.
+// pays for rounding. Memory: 64 bytes a face, 128 a piece, of which most faces have some.
 
 #include <algorithm>
 #include <array>
@@ -66,7 +66,8 @@ public:
     /// `bound`: one a face.
     SurfaceMap(const std::vector<float>& bound, const Effort& effort);
 
-    /// The faces that remain have new bounds after this. `stated`: an error that the collapse
+    /// The faces that remain have new bounds after this; the star's places are relative to the
+    /// merged vertex then. `stated`: an error that the collapse
     /// states anyhow. False: nothing is done, as the new fan is not to be seen from anywhere, and
     /// its bounds would exceed `most`.
     bool collapse(CollapsingStar& star, float stated, float most);
