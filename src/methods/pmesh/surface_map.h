@@ -22,6 +22,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <span>
 #include <vector>
 
@@ -138,7 +139,7 @@ private:
 
     Effort effort_;
     std::vector<Face> face_;
-    std::vector<Piece> piece_;
+    std::deque<Piece> piece_;  // never moved: doubling would take twice the memory
     std::vector<uint32_t> free_;
 
     // While collapsing; all positions are relative to the merged vertex.
