@@ -138,7 +138,7 @@ TEST(PmeshBuild, SaysHowMuchMemoryItNeeds) {
         FAIL();
     } catch (const std::exception& e) {
         EXPECT_EQ(std::string(e.what()),
-                  "a progressive mesh, built in memory, needs 4.4 MiB, but only 1.0 MiB of the "
+                  "a progressive mesh, built in memory, needs 14.6 MiB, but only 1.0 MiB of the "
                   "memory limit are left");
     }
 }
