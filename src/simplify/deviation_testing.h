@@ -370,13 +370,14 @@ public:
         double distance = std::numeric_limits<double>::max();
         uint32_t triangle = 0;
     };
-    Hit nearest(const Vec3d& p) const {
+    /// Or, sooner, any that is no farther than `enough`.
+    Hit nearest(const Vec3d& p, double enough = 0) const {
         Hit hit;
         const Vec3i home = glm::clamp(Vec3i(glm::floor((p - min_) / cell_)), Vec3i(0), dim_ - 1);
         const double outside = glm::length(p - glm::clamp(p, min_, max_));
         const int far = std::max({dim_.x, dim_.y, dim_.z});
         for (int ring = 0; ring <= far; ++ring) {
-            if (hit.distance <= (ring - 1) * cell_ - outside) break;
+            if (hit.distance <= std::max(enough, (ring - 1) * cell_ - outside)) break;
             const Vec3i lo = glm::max(home - ring, Vec3i(0)), hi = glm::min(home + ring, dim_ - 1);
             for (int z = lo.z; z <= hi.z; ++z) {
                 for (int y = lo.y; y <= hi.y; ++y) {

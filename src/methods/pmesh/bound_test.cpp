@@ -89,14 +89,17 @@ private:
     Ratios measure(int i) {
         const MeshCut cut = model_->cut(request(i), budget_);
         Ratios ratios;
+        const auto compare = [](double& largest, const pietra::testing::DistanceOracle& mesh,
+                                const Vec3d& p, double stated) {
+            stated += 1e-9;
+            largest = std::max(largest, mesh.nearest(p, largest * stated).distance / stated);
+        };
         sample(cut.mesh, random_, [&](const Vec3d& p, uint64_t t) {
-            ratios.mesh_to_input = std::max(
-                ratios.mesh_to_input, oracle_->nearest(p).distance / (double(cut.error[t]) + 1e-9));
+            compare(ratios.mesh_to_input, *oracle_, p, cut.error[t]);
         });
         const pietra::testing::DistanceOracle cut_oracle(cut.mesh);
         sample(input_, random_, [&](const Vec3d& p, uint64_t) {
-            ratios.input_to_mesh = std::max(
-                ratios.input_to_mesh, cut_oracle.nearest(p).distance / (cut.max_error + 1e-9));
+            compare(ratios.input_to_mesh, cut_oracle, p, cut.max_error);
         });
         return ratios;
     }

@@ -179,13 +179,13 @@ bool SurfaceMap::collapse(CollapsingStar& star, float stated, float most) {
     stated_ = stated;
     largest_ = 0;
     overflow_ = false;
-    made_.clear();
     uint32_t count;
     const auto old = oldFaces(count);
     for (uint32_t i = 0; i < star.edges(); ++i) {
         sector_[i].edge = {star.ring[i], star.ring[star.after(i)]};
         sector_[i].dual = dualOf(sector_[i].edge);
         sector_[i].rest = -1;
+        sector_[i].made = 0;
     }
     Plane plane;
     plane_ = &plane;
@@ -195,8 +195,11 @@ bool SurfaceMap::collapse(CollapsingStar& star, float stated, float most) {
         for (uint32_t i = 0; i < count; ++i) take(old[i]);
     }
     if (!seen || overflow_) {
-        for (const Made& m : made_) free_.push_back(m.piece);
-        made_.clear();
+        for (uint32_t i = 0; i < star.edges(); ++i) {
+            for (uint32_t p = 0; p < sector_[i].made; ++p)
+                free_.push_back(sector_[i].piece[p].piece);
+            sector_[i].made = 0;
+        }
         if (!takeUnseen(std::span(old).first(count), most)) return false;
     }
     for (uint32_t i = 0; i < count; ++i) {
@@ -252,7 +255,7 @@ void SurfaceMap::take(const Old& old) {
     const Lanes4 same{1, 1, 0, 0};
     Polygon polygon;
     for (uint32_t p = 0; p < face.pieces; ++p) {
-        const Piece& piece = piece_[face.piece[p]];
+        const Piece& piece = pieceAt(face.piece[p]);
         polygon.size = piece.size;
         for (uint32_t k = 0; k < piece.size; ++k) {
             const Lanes4& w = piece.corner[k];
@@ -395,14 +398,18 @@ void SurfaceMap::give(uint32_t edge, const Polygon& part) {
     }
     bound *= 1 + 0x1p-20f;
     largest_ = std::max(largest_, bound);
-    if (bound <= limit) {
+    if (bound <= limit || effort_.matters >= 1) {
         sector_[edge].rest = std::max(sector_[edge].rest, bound);
         return;
     }
     Polygon placed;
     placed.size = part.size;
+    const uint32_t apex = star_->apex[edge];
     for (uint32_t k = 0; k < part.size; k += 4) {
         auto& [a, b, c, d] = weights[k / 4];
+        const Lanes4 at_apex = 1 - c - d;
+        if (apex == 1) d = c, c = at_apex;
+        if (apex == 2) c = d, d = at_apex;
         transpose(a, b, c, d);
         std::copy_n(weights[k / 4].data(), 4, &placed.corner[k]);
     }
@@ -419,60 +426,62 @@ void SurfaceMap::keep(uint32_t edge, const Polygon& part, float bound) {
         keep(edge, half[0], bound);
         return keep(edge, half[1], bound);
     }
-    if (free_.empty()) {
-        free_.push_back(uint32_t(piece_.size()));
-        piece_.emplace_back();
+    Sector& sector = sector_[edge];
+    if (sector.made == effort_.kept) {
+        const float least = sector.piece[0].bound;
+        sector.rest = std::max(sector.rest, std::min(bound, least));
+        if (bound <= least) return;
     }
-    made_.push_back({edge, free_.back(), bound});
-    Piece& piece = piece_[free_.back()];
-    free_.pop_back();
+    const uint32_t at = placeAmong(edge, bound);
+    Piece& piece = pieceAt(at);
     piece.source = from_;
     piece.source.origin += star_->merged;
     piece.size = part.size;
     std::copy_n(part.corner.data(), part.size, piece.corner.data());
 }
 
-/// Keeps the pieces that matter most.
+/// A piece for a sector's, of which it takes the place of the first one where they are all.
+uint32_t SurfaceMap::placeAmong(uint32_t edge, float bound) {
+    Sector& sector = sector_[edge];
+    uint32_t at, i;
+    if (sector.made == effort_.kept) {
+        at = sector.piece[0].piece;
+        for (i = 0; i + 1 < sector.made && sector.piece[i + 1].bound < bound; ++i)
+            sector.piece[i] = sector.piece[i + 1];
+    } else {
+        if (free_.empty()) {
+            const auto first = uint32_t(chunk_.size()) * kChunk;
+            chunk_.push_back(std::make_unique<std::array<Piece, kChunk>>());
+            for (uint32_t n = kChunk; n > 0; --n) free_.push_back(first + n - 1);
+        }
+        at = free_.back();
+        free_.pop_back();
+        for (i = sector.made++; i > 0 && sector.piece[i - 1].bound >= bound; --i)
+            sector.piece[i] = sector.piece[i - 1];
+    }
+    sector.piece[i] = {at, bound};
+    return at;
+}
+
+/// Keeps the pieces that matter.
 void SurfaceMap::finish() {
+    const float limit = this->limit();
     for (uint32_t i = 0; i < star_->edges(); ++i) {
+        Sector& sector = sector_[i];
         Face& face = face_[star_->face[i]];
-        face.rest = face.bound = sector_[i].rest;
         face.pieces = 0;
-    }
-    const auto matters = [&](const Made& made) {
-        if (made.bound > limit()) return true;
-        Face& face = face_[star_->face[made.edge]];
-        face.bound = std::max(face.bound, made.bound);
-        face.rest = std::max(face.rest, made.bound);
-        free_.push_back(made.piece);
-        return false;
-    };
-    const auto end = std::partition(made_.begin(), made_.end(), matters);
-    made_.erase(end, made_.end());
-    std::sort(made_.begin(), made_.end(), [](const Made& a, const Made& b) {
-        return a.bound != b.bound ? a.bound > b.bound : a.piece < b.piece;
-    });
-    for (const Made& made : made_) {
-        Face& face = face_[star_->face[made.edge]];
-        face.bound = std::max(face.bound, made.bound);
-        if (face.pieces == effort_.kept) {
-            face.rest = std::max(face.rest, made.bound);
-            free_.push_back(made.piece);
-            continue;
+        face.bound = face.rest = sector.rest;
+        for (uint32_t p = sector.made; p-- > 0;) {
+            const Made& made = sector.piece[p];
+            face.bound = std::max(face.bound, made.bound);
+            if (made.bound > limit) {
+                face.piece[face.pieces++] = made.piece;
+            } else {
+                face.rest = std::max(face.rest, made.bound);
+                free_.push_back(made.piece);
+            }
         }
-        face.piece[face.pieces++] = made.piece;
-        const uint32_t apex = star_->apex[made.edge];
-        if (apex == 0) continue;
-        Piece& piece = piece_[made.piece];
-        for (uint32_t k = 0; k < piece.size; ++k) {
-            Lanes4& c = piece.corner[k];
-            const float at_apex = 1 - c[2] - c[3];
-            c = apex == 1 ? Lanes4{c[0], c[1], at_apex, c[2]} : Lanes4{c[0], c[1], c[3], at_apex};
-        }
-    }
-    // So thin that nothing was seen in it: as its neighbours.
-    for (uint32_t i = 0; i < star_->edges(); ++i) {
-        Face& face = face_[star_->face[i]];
+        // So thin that nothing was seen in it: as its neighbours.
         if (face.rest < 0 && face.pieces == 0) face.rest = face.bound = largest_;
     }
 }

@@ -22,7 +22,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <deque>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -77,7 +77,7 @@ public:
     void expect(uint32_t face) const { __builtin_prefetch(&face_[face]); }
     void expectPieces(uint32_t face) const {
         for (uint32_t p = 0; p < face_[face].pieces; ++p) {
-            const Piece* const piece = &piece_[face_[face].piece[p]];
+            const Piece* const piece = &pieceAt(face_[face].piece[p]);
             __builtin_prefetch(piece);
             __builtin_prefetch(&piece->corner[1]);
         }
@@ -134,15 +134,23 @@ private:
     void sweep(const Polygon& polygon, const glm::vec2& base, uint32_t sector);
     void give(uint32_t edge, const Polygon& part);
     void keep(uint32_t edge, const Polygon& part, float bound);
+    uint32_t placeAmong(uint32_t edge, float bound);
     void finish();
     bool takeUnseen(std::span<const Old> old, float most);
 
     Effort effort_;
     std::vector<Face> face_;
-    std::deque<Piece> piece_;  // never moved: doubling would take twice the memory
+    // Never moved: doubling would take twice the memory.
+    static constexpr uint32_t kChunk = 1024;
+    std::vector<std::unique_ptr<std::array<Piece, kChunk>>> chunk_;
+    Piece& pieceAt(uint32_t i) const { return (*chunk_[i / kChunk])[i % kChunk]; }
     std::vector<uint32_t> free_;
 
     // While collapsing; all positions are relative to the merged vertex.
+    struct Made {
+        uint32_t piece;
+        float bound;
+    };
     struct Sector {
         std::array<Vec3f, 2> edge, dual;
         float rest;
@@ -151,16 +159,13 @@ private:
         /// triangle's shape.
         glm::vec2 to_shorter, to_longer, shorter;
         bool second_is_longer;
-    };
-    struct Made {
-        uint32_t edge, piece;
-        float bound;
+        uint32_t made;  ///< pieces: those that matter most, the first one least
+        std::array<Made, kMostKept> piece;
     };
     const CollapsingStar* star_ = nullptr;
     const Plane* plane_ = nullptr;
     std::array<Sector, kMaxNeighbours> sector_;  // the new faces
-    std::vector<Made> made_;
-    Source from_;  // where the polygon at work is from
+    Source from_;                                // where the polygon at work is from
     std::array<Vec3f, 2> from_dual_;
     bool has_dual_ = false;
     float extent_ = 0, slack_ = 0, stated_ = 0, largest_ = 0;
