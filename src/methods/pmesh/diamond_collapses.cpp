@@ -266,8 +266,8 @@ private:
         cell.blob.store->get(cell.blob, worker.scratch);
         worker.add(worker.scratch, cell.blob.store == &input_.store, label);
     }
-    /// Three quarters of all collapses are of the finest diamonds, whose errors soon matter little:
-    /// pieces there would take a fifth of the time and change no coarse error.
+    /// Most collapses are of the finest diamonds, whose errors soon matter little: pieces there would
+    /// take a fifth of the time.
     static SurfaceMap::Effort effortAt(int height) {
         constexpr std::array<SurfaceMap::Effort, 4> kEffort{{{0, 1}, {0, 1}, {4, 0.8f}, {6, 0.6f}}};
         return kEffort[size_t(std::clamp(height - 1, 0, 3))];
