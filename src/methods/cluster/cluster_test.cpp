@@ -1,0 +1,188 @@
+// Face-cluster layers: every layer of every cell is a valid mesh of polygons, and every choice of
+// layers is one mesh without cracks.
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <random>
+
+#include "base/parallel.h"
+#include "methods/cluster/cluster_testing.h"
+#include "methods/cluster/layers.h"
+#include "simplify/test_meshes.h"
+
+namespace pietra::cluster {
+namespace {
+
+struct Input {
+    const char* name;
+    std::function<Mesh()> make;
+    bool orientable = true;
+};
+
+/// Two balls, one of which touches the other in a point, and a flat ring.
+test::Shape touchingShape() {
+    test::Shape shape = test::sphereShape(12);
+    const uint32_t base = uint32_t(shape.position.size());
+    test::Shape other = test::sphereShape(9);
+    const Vec3d touch = shape.position[5];
+    const Vec3d shift = touch - other.position[40];
+    for (const Vec3d& p : other.position) shape.position.push_back(p + shift);
+    for (const auto& [a, b, c] : other.triangle)
+        shape.triangle.push_back({base + a, base + b, base + c});
+    return shape;
+}
+
+/// One band of squares around a cylinder, n squares long.
+test::Shape bandShape(int n, int turned) {
+    test::Shape shape;
+    for (int i = 0; i < n; ++i)
+        for (const double side : {-1.0, 1.0}) {
+            const double angle = 6.283185307179586 * i / n, tilt = turned * angle / 2;
+            const double r = 8 + side * std::sin(tilt);
+            shape.position.push_back(
+                {r * std::cos(angle), r * std::sin(angle), side * std::cos(tilt)});
+        }
+    for (int i = 0; i < n; ++i) {
+        const bool last = i + 1 == n;
+        const uint32_t a = uint32_t(2 * i), b = a + 1;
+        uint32_t c = last ? 0 : a + 2, d = last ? 1 : a + 3;
+        if (last && turned % 2 != 0) std::swap(c, d);
+        shape.triangle.push_back({a, c, b});
+        shape.triangle.push_back({b, c, d});
+    }
+    return shape;
+}
+
+test::Shape rough(test::Shape shape, double amount) {
+    std::mt19937_64 random(7);
+    std::uniform_real_distribution<double> unit(-amount, amount);
+    for (Vec3d& p : shape.position) p += Vec3d(unit(random), unit(random), unit(random));
+    return shape;
+}
+
+const Input kInputs[] = {
+    {"ball", [] { return test::toLattice(test::sphereShape(24), 1 << 20); }},
+    {"rough ball",
+     [] { return test::toLattice(test::subdivide(test::sphereShape(12), 0.3, 3), 1 << 20); }},
+    {"sheet", [] { return test::toLattice(test::gridShape(50, 0.2), 1 << 16); }},
+    {"crumpled sheet",
+     [] { return test::toLattice(rough(test::gridShape(40, 0.2), 0.02), 1 << 10); }},
+    {"sheet with holes",
+     [] {
+         const Mesh sheet = test::toLattice(test::gridShape(60, 0.1), 1 << 16);
+         Mesh holes = test::extract(
+             sheet, [](uint32_t t) { return (t / 2 % 60 / 5 + t / 120 / 5) % 5 != 2; });
+         test::classifyEdges(holes);
+         return holes;
+     }},
+    {"coarse lattice", [] { return test::toLattice(test::gridShape(40, 0.1), 47); }},
+    {"book", [] { return test::toLattice(test::bookShape(24), 1 << 16); }},
+    {"dust", [] { return test::toLattice(test::dustShape(400, 0.05, 5), 1 << 12); }},
+    {"soup", [] { return test::toLattice(test::soupShape(300, 0.2, 5), 1 << 12); }},
+    {"touching", [] { return test::toLattice(touchingShape(), 1 << 16); }, false},
+    {"band", [] { return test::toLattice(bandShape(120, 0), 1 << 16); }},
+    {"Moebius band", [] { return test::toLattice(bandShape(121, 1), 1 << 16); }, false},
+};
+
+LayerSettings smallCells(uint32_t vertices) {
+    LayerSettings settings;
+    settings.cell_vertices = vertices;
+    settings.layers = 5;
+    return settings;
+}
+
+std::vector<uint16_t> sameLayer(const LayeredPiece& piece, uint16_t layer) {
+    return std::vector<uint16_t>(piece.cell.size(), layer);
+}
+
+std::vector<uint16_t> randomLayers(const LayeredPiece& piece, uint64_t seed) {
+    std::mt19937_64 random(seed);
+    std::vector<uint16_t> layers;
+    for (size_t c = 0; c < piece.cell.size(); ++c)
+        layers.push_back(uint16_t(random() % (piece.layers + 1u)));
+    return layers;
+}
+
+TEST(Cluster, EachLayerIsWhole) {
+    for (const Input& input : kInputs) {
+        const Mesh mesh = input.make();
+        for (const uint32_t vertices : {60u, 400u, 1u << 30}) {
+            const LayeredPiece piece = buildLayers(mesh, smallCells(vertices));
+            for (uint16_t layer = 0; layer <= piece.layers; ++layer) {
+                const Mesh whole = mixedMesh(piece, sameLayer(piece, layer));
+                const CrackCount cracks = countCracks(whole, mesh, input.orientable);
+                EXPECT_TRUE(cracks.ok()) << input.name << ", cells of " << vertices << ", layer "
+                                         << layer << ": " << cracks.text();
+            }
+        }
+    }
+}
+
+TEST(Cluster, AnyChoiceOfLayersIsWhole) {
+    for (const Input& input : kInputs) {
+        const Mesh mesh = input.make();
+        for (const uint32_t vertices : {20u, 100u, 500u}) {
+            const LayeredPiece piece = buildLayers(mesh, smallCells(vertices));
+            for (uint64_t seed = 0; seed < 12; ++seed) {
+                const Mesh mixed = mixedMesh(piece, randomLayers(piece, seed));
+                const CrackCount cracks = countCracks(mixed, mesh, input.orientable);
+                EXPECT_TRUE(cracks.ok()) << input.name << ", cells of " << vertices << ", choice "
+                                         << seed << ": " << cracks.text();
+            }
+        }
+    }
+}
+
+TEST(Cluster, WithoutStripsThereAreCracks) {
+    const Mesh mesh = kInputs[0].make();
+    const LayeredPiece piece = buildLayers(mesh, smallCells(100));
+    const CrackCount cracks =
+        countCracks(mixedMesh(piece, randomLayers(piece, 1), false), mesh, true);
+    EXPECT_LT(20u, cracks.cracked) << cracks.text();
+}
+
+TEST(Cluster, Layer0IsTheInput) {
+    const Mesh mesh = kInputs[1].make();
+    const LayeredPiece piece = buildLayers(mesh, smallCells(100));
+    const auto corners = [](const Mesh& m) {
+        std::multiset<std::array<uint64_t, 3>> all;
+        for (const Triangle& t : m.triangle) {
+            std::array<uint64_t, 3> keys;
+            for (size_t k = 0; k < 3; ++k) keys[k] = latticeKey(m.position[t[k]]);
+            std::rotate(keys.begin(), std::min_element(keys.begin(), keys.end()), keys.end());
+            all.insert(keys);
+        }
+        return all;
+    };
+    EXPECT_EQ(corners(mixedMesh(piece, sameLayer(piece, 0))), corners(mesh));
+}
+
+TEST(Cluster, LayersGetFewer) {
+    const Mesh mesh = kInputs[0].make();
+    LayerSettings settings = smallCells(1u << 30);
+    settings.layers = 3;
+    const LayeredPiece piece = buildLayers(mesh, settings);
+    size_t before = mesh.triangleCount();
+    for (uint16_t layer = 1; layer <= 3; ++layer) {
+        const size_t count = piece.cell[0].layer[layer].mesh.triangleCount();
+        EXPECT_LT(count, before * 2 / 5);
+        EXPECT_LT(before / 8, count);
+        before = count;
+    }
+}
+
+TEST(Cluster, TheSameForAnyNumberOfThreads) {
+    const Mesh mesh = kInputs[1].make();
+    const auto build = [&mesh](int jobs) {
+        const ThreadLimit limit(jobs);
+        const LayeredPiece piece = buildLayers(mesh, smallCells(100));
+        return mixedMesh(piece, randomLayers(piece, 3));
+    };
+    const Mesh one = build(1), seven = build(7);
+    EXPECT_EQ(one.position, seven.position);
+    EXPECT_EQ(one.triangle, seven.triangle);
+}
+
+}  // namespace
+}  // namespace pietra::cluster

@@ -1,0 +1,196 @@
+#include "methods/cluster/face_clusters.h"
+
+#include <algorithm>
+#include <bit>
+#include <numeric>
+#include <queue>
+
+#include "base/check.h"
+
+namespace pietra::cluster {
+
+namespace {
+
+struct Proxy {
+    Vec3f centroid, normal;
+};
+
+Proxy proxyOf(const FaceShape& shape) {
+    const double length = glm::length(shape.normal);
+    return {Vec3f(shape.centroid()), length > 0 ? Vec3f(shape.normal / length) : Vec3f(0)};
+}
+
+class Regions {
+public:
+    Regions(const PolygonMesh& mesh, uint32_t count, const ClusterSettings& settings)
+        : mesh_(mesh), settings_(settings), corners_(mesh), label_(mesh.faceCount()) {
+        double area = 0;
+        for (const FaceShape& shape : mesh.shape) {
+            face_.push_back(proxyOf(shape));
+            area += shape.area;
+        }
+        normal_scale_ = settings.normal_weight * float(area / count);
+        for (uint64_t k = 0; k < count; ++k) {
+            seed_.push_back(uint32_t((2 * k + 1) * mesh.faceCount() / (2 * uint64_t(count))));
+            proxy_.push_back(face_[seed_.back()]);
+        }
+    }
+
+    Groups run() {
+        for (int round = 1; round < settings_.most_rounds; ++round) {
+            grow(false);
+            if (!chooseRepresentatives()) break;
+        }
+        grow(true);
+        growRest();
+        return inOrder();
+    }
+
+private:
+    float cost(uint32_t f, uint32_t region) const {
+        const Proxy& p = proxy_[region];
+        const Vec3f d = face_[f].centroid - p.centroid;
+        const float across = glm::dot(d, p.normal);
+        return glm::dot(d, d) + settings_.plane_weight * (across * across) +
+               normal_scale_ * (1 - glm::dot(face_[f].normal, p.normal));
+    }
+
+    /// Waiting faces are known by their half-edge towards the region that may take them. Costs are
+    /// not negative but for rounding, so their bits have their order.
+    void offerNeighbours(uint32_t f) {
+        for (uint32_t h = mesh_.face_begin[f]; h < mesh_.face_begin[f + 1]; ++h) {
+            const uint32_t t = mesh_.twin[h];
+            if (t == kNone || label_[mesh_.face[t]] != kNone) continue;
+            const float c = std::max(0.0f, cost(mesh_.face[t], label_[f]));
+            waiting_.push(uint64_t(std::bit_cast<uint32_t>(c)) << 32 | t);
+        }
+    }
+
+    void take(uint32_t f, uint32_t region) {
+        label_[f] = region;
+        offerNeighbours(f);
+    }
+
+    void takeWaiting(bool discs, uint32_t most) {
+        for (uint32_t taken = 0; !waiting_.empty() && taken < most;) {
+            const uint32_t h = uint32_t(waiting_.top());
+            waiting_.pop();
+            const uint32_t f = mesh_.face[h];
+            if (label_[f] != kNone) continue;
+            const uint32_t region = label_[mesh_.face[mesh_.twin[h]]];
+            if (discs && !staysDisc(f, region)) continue;
+            take(f, region);
+            ++taken;
+        }
+        waiting_ = {};
+    }
+
+    void grow(bool discs) {
+        std::fill(label_.begin(), label_.end(), kNone);
+        outline_.clear();
+        for (uint32_t k = 0; k < seed_.size(); ++k) {
+            label_[seed_[k]] = k;
+            outline_.push_back(mesh_.corners(seed_[k]));
+        }
+        for (const uint32_t f : seed_) offerNeighbours(f);
+        takeWaiting(discs, mesh_.faceCount());
+    }
+
+    /// What no region took: components without a representative, and what no region could take.
+    void growRest() {
+        const uint32_t most = 2 * mesh_.faceCount() / uint32_t(seed_.size());
+        for (uint32_t f = 0; f < mesh_.faceCount(); ++f) {
+            if (label_[f] != kNone) continue;
+            const uint32_t region = uint32_t(seed_.size());
+            seed_.push_back(f);
+            proxy_.push_back(face_[f]);
+            outline_.push_back(mesh_.corners(f));
+            take(f, region);
+            takeWaiting(true, most);
+        }
+    }
+
+    /// Whether face and region, both discs, meet in one path of edges and nowhere else, and leave
+    /// an outline of three corners or more. Then both together are a disc, and its outline is
+    /// simple.
+    bool staysDisc(uint32_t f, uint32_t region) {
+        uint32_t shared = 0, paths = 0, met = 0;
+        const uint32_t begin = mesh_.face_begin[f], end = mesh_.face_begin[f + 1];
+        bool was_shared = isShared(end - 1, region);
+        for (uint32_t h = begin; h < end; ++h) {
+            const bool is_shared = isShared(h, region);
+            shared += is_shared;
+            paths += is_shared && !was_shared;
+            met += is_shared || was_shared || isAt(mesh_.corner[h], region);
+            was_shared = is_shared;
+        }
+        const uint32_t outline = outline_[region] + (end - begin) - 2 * shared;
+        if (paths != 1 || met != shared + 1 || outline < 3) return false;
+        outline_[region] = outline;
+        return true;
+    }
+
+    bool isShared(uint32_t h, uint32_t region) const {
+        const uint32_t t = mesh_.twin[h];
+        return t != kNone && label_[mesh_.face[t]] == region;
+    }
+
+    bool isAt(uint32_t vertex, uint32_t region) const {
+        for (const uint32_t h : corners_.at(vertex))
+            if (label_[mesh_.face[h]] == region) return true;
+        return false;
+    }
+
+    /// False when none changes.
+    bool chooseRepresentatives() {
+        std::vector<FaceShape> sum(seed_.size());
+        for (uint32_t f = 0; f < mesh_.faceCount(); ++f)
+            if (label_[f] != kNone) sum[label_[f]].add(mesh_.shape[f]);
+        for (uint32_t k = 0; k < seed_.size(); ++k) proxy_[k] = proxyOf(sum[k]);
+        std::vector<uint32_t> best(seed_);
+        std::vector<float> least(seed_.size());
+        for (uint32_t k = 0; k < seed_.size(); ++k) least[k] = cost(seed_[k], k);
+        for (uint32_t f = 0; f < mesh_.faceCount(); ++f) {
+            const uint32_t k = label_[f];
+            if (k == kNone) continue;
+            const float c = cost(f, k);
+            if (c < least[k]) least[k] = c, best[k] = f;
+        }
+        const bool changed = best != seed_;
+        seed_ = best;
+        return changed;
+    }
+
+    /// Numbers regions by their representatives.
+    Groups inOrder() const {
+        std::vector<uint32_t> order(seed_.size()), number(seed_.size());
+        std::iota(order.begin(), order.end(), 0u);
+        std::sort(order.begin(), order.end(),
+                  [&](uint32_t a, uint32_t b) { return seed_[a] < seed_[b]; });
+        for (uint32_t i = 0; i < order.size(); ++i) number[order[i]] = i;
+        Groups groups{uint32_t(order.size()), label_};
+        for (uint32_t& g : groups.of_face) g = number[g];
+        return groups;
+    }
+
+    const PolygonMesh& mesh_;
+    const ClusterSettings& settings_;
+    const Corners corners_;
+    std::vector<Proxy> face_;        // of each face
+    std::vector<uint32_t> seed_;     // of each region: the representative
+    std::vector<Proxy> proxy_;       // of each region
+    std::vector<uint32_t> outline_;  // of each region: corners
+    std::vector<uint32_t> label_;    // of each face: its region
+    float normal_scale_ = 0;
+    std::priority_queue<uint64_t, std::vector<uint64_t>, std::greater<>> waiting_;
+};
+
+}  // namespace
+
+Groups clusterFaces(const PolygonMesh& mesh, uint32_t count, const ClusterSettings& settings) {
+    if (mesh.faceCount() == 0) return {};
+    count = std::clamp(count, 1u, mesh.faceCount());
+    return Regions(mesh, count, settings).run();
+}
+
+}  // namespace pietra::cluster

@@ -1,0 +1,27 @@
+#pragma once
+// K-means face clustering (Wu and Huang 2014, figure 1): K representative faces; regions grow from
+// them over the dual graph, always where it costs least; each region chooses the face that stands
+// for it best; until that settles. Regions are discs with simple outlines: what would close a ring
+// or touch its own region is refused, and left to others, or becomes a region of its own.
+//
+// A function of the mesh alone. Every round is n log n in the region's borders: 8 bytes a waiting
+// face.
+
+#include "methods/cluster/polygon_mesh.h"
+
+namespace pietra::cluster {
+
+struct ClusterSettings {
+    int most_rounds = 4;  ///< of growing; the last one makes discs
+    /// Cost of a face for a region: squared distance of the centroids, plus this times that across
+    /// the region's plane, ...
+    float plane_weight = 4;
+    /// ... plus this times the mean area of a region times (1 - cosine of the normals).
+    float normal_weight = 1;
+};
+
+/// About `count` regions. Faces should be in an order in which those that are near each other lie
+/// together: first representatives are taken from it at equal steps; groups come in that order.
+Groups clusterFaces(const PolygonMesh& mesh, uint32_t count, const ClusterSettings& settings = {});
+
+}  // namespace pietra::cluster

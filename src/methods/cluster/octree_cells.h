@@ -1,0 +1,19 @@
+#pragma once
+// The octree partition of Wu and Huang 2014, section 5.1. Vertices lie in a cell; a triangle
+// belongs to the cell of two of its vertices or more, or else to that of its first one. In memory.
+
+#include <vector>
+
+#include "geometry/mesh.h"
+
+namespace pietra::cluster {
+
+struct CellTriangles {
+    std::vector<std::vector<uint32_t>> of_cell;  ///< triangles, along a space-filling curve
+};
+
+/// Cells are divided until they hold at most `most_vertices`. Empty ones are left out; the order is
+/// that of the curve.
+CellTriangles octreeCells(const Mesh& mesh, uint32_t most_vertices);
+
+}  // namespace pietra::cluster

@@ -1,0 +1,185 @@
+#include "methods/cluster/triangulation.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "base/hash.h"
+
+namespace pietra::cluster {
+
+namespace {
+
+/// Pairs of vertices that are joined. Open addressing; grows.
+class Joined {
+public:
+    explicit Joined(size_t expected) : slot_(std::bit_ceil(2 * expected + 16), kEmpty) {}
+    bool has(uint32_t a, uint32_t b) const { return slot_[find(key(a, b))] != kEmpty; }
+    void add(uint32_t a, uint32_t b) {
+        uint64_t& at = slot_[find(key(a, b))];
+        count_ += at == kEmpty;
+        at = key(a, b);
+        if (2 * count_ < slot_.size()) return;
+        std::vector<uint64_t> old(slot_.size() * 2, kEmpty);
+        old.swap(slot_);
+        for (const uint64_t k : old)
+            if (k != kEmpty) slot_[find(k)] = k;
+    }
+
+private:
+    static constexpr uint64_t kEmpty = ~uint64_t(0);
+    static uint64_t key(uint32_t a, uint32_t b) {
+        return uint64_t(std::min(a, b)) << 32 | std::max(a, b);
+    }
+    size_t find(uint64_t k) const {
+        size_t i = mixBits(k) & (slot_.size() - 1);
+        while (slot_[i] != kEmpty && slot_[i] != k) i = (i + 1) & (slot_.size() - 1);
+        return i;
+    }
+    std::vector<uint64_t> slot_;
+    size_t count_ = 0;
+};
+
+/// A corner of what is left of a polygon, and the edge to the next one.
+struct Corner {
+    uint32_t vertex;
+    EdgeClass edge_class;
+    glm::i64vec2 flat;  // projected along the axis nearest to the normal: exact
+};
+
+int64_t turn(const Corner& a, const Corner& b, const Corner& c) {
+    const glm::i64vec2 u = b.flat - a.flat, v = c.flat - a.flat;
+    return u.x * v.y - u.y * v.x;
+}
+
+class Triangulator {
+public:
+    Triangulator(const PolygonMesh& polygons, const FreePoint& free_point)
+        : polygons_(polygons), free_point_(free_point), joined_(polygons.halfEdgeCount()) {
+        for (uint32_t h = 0; h < polygons.halfEdgeCount(); ++h)
+            joined_.add(polygons.corner[h], polygons.end(h));
+        out_.mesh.position = polygons.position;
+    }
+
+    LayerTriangles run() {
+        for (face_ = 0; face_ < polygons_.faceCount(); ++face_) {
+            loadPolygon();
+            if (corner_.size() > 3 && !planEars()) {
+                loadPolygon();
+                emitStar();
+                continue;
+            }
+            for (const auto& [a, b] : diagonals_) joined_.add(a, b);
+            for (const auto& ear : ears_) emit(ear);
+            emit({corner_[0], corner_[1], corner_[2]});
+        }
+        return std::move(out_);
+    }
+
+private:
+    void loadPolygon() {
+        corner_.clear();
+        ears_.clear();
+        diagonals_.clear();
+        normal_ = polygons_.shape[face_].normal;
+        const double length = glm::length(normal_);
+        if (length > 0) normal_ /= length;
+        const Vec3d size = glm::abs(normal_);
+        const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
+        const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+        const bool turned = normal_[axis] < 0;
+        for (uint32_t h = polygons_.face_begin[face_]; h < polygons_.face_begin[face_ + 1]; ++h) {
+            const Vec3i& p = polygons_.position[polygons_.corner[h]];
+            corner_.push_back({polygons_.corner[h], polygons_.edge_class[h],
+                               turned ? glm::i64vec2(p[v], p[u]) : glm::i64vec2(p[u], p[v])});
+        }
+    }
+
+    /// Down to three corners; false where no ear may be cut.
+    bool planEars() {
+        while (corner_.size() > 3) {
+            const size_t n = corner_.size();
+            size_t best = n;
+            double most = 0;
+            for (size_t i = 0; i < n; ++i) {
+                const Corner &a = corner_[(i + n - 1) % n], &c = corner_[(i + 1) % n];
+                if (polygons_.interface_[a.vertex] && polygons_.interface_[c.vertex]) continue;
+                if (joined_.has(a.vertex, c.vertex)) continue;
+                const double quality = qualityOfEar(i);
+                if (best == n || quality > most) best = i, most = quality;
+            }
+            if (best == n) return false;
+            Corner &a = corner_[(best + n - 1) % n], &c = corner_[(best + 1) % n];
+            ears_.push_back({a, corner_[best], c});
+            ears_.back()[2].edge_class = EdgeClass::kManifold;
+            a.edge_class = EdgeClass::kManifold;
+            diagonals_.push_back({a.vertex, c.vertex});
+            corner_.erase(corner_.begin() + ptrdiff_t(best));
+        }
+        return true;
+    }
+
+    /// Height over length of its sides; ears that fold over are the worst.
+    double qualityOfEar(size_t i) const {
+        const size_t n = corner_.size();
+        const Corner &a = corner_[(i + n - 1) % n], &b = corner_[i], &c = corner_[(i + 1) % n];
+        const Vec3d p(polygons_.position[a.vertex]), q(polygons_.position[b.vertex]),
+            r(polygons_.position[c.vertex]);
+        const Vec3d pq = q - p, pr = r - p, qr = r - q;
+        const double sides = glm::dot(pq, pq) + glm::dot(pr, pr) + glm::dot(qr, qr);
+        const double quality = glm::dot(glm::cross(pq, pr), normal_) / sides;
+        if (turn(a, b, c) <= 0) return quality - 4;
+        for (size_t j = 0; j + 3 < n; ++j) {
+            const Corner& d = corner_[(i + 2 + j) % n];
+            if (turn(a, b, d) >= 0 && turn(b, c, d) >= 0 && turn(c, a, d) >= 0) return quality - 2;
+        }
+        return quality;
+    }
+
+    void emitStar() {
+        ++out_.stars;
+        const uint32_t centre = uint32_t(out_.mesh.position.size());
+        if (const uint32_t m = polygons_.middle[face_]; m != kNone) {
+            out_.mesh.position.push_back(polygons_.inner_position[m]);
+        } else {
+            ++out_.free_points;
+            const Vec3d near = polygons_.shape[face_].centroid();
+            out_.mesh.position.push_back(free_point_(Vec3i(glm::floor(near + 0.5))));
+        }
+        for (size_t i = 0; i < corner_.size(); ++i) {
+            Corner a = corner_[i], b = corner_[(i + 1) % corner_.size()];
+            b.edge_class = EdgeClass::kManifold;
+            emit({a, b, Corner{centre, EdgeClass::kManifold, {}}});
+        }
+    }
+
+    void emit(const std::array<Corner, 3>& corners) {
+        Triangle triangle;
+        uint32_t classes = 0;
+        for (size_t k = 0; k < 3; ++k) {
+            triangle[k] = corners[k].vertex;
+            classes |= uint32_t(corners[k].edge_class) << (2 * k);
+        }
+        out_.mesh.triangle.push_back(triangle);
+        out_.mesh.edge_class.push_back(uint8_t(classes));
+        out_.face.push_back(face_);
+    }
+
+    const PolygonMesh& polygons_;
+    const FreePoint& free_point_;
+    Joined joined_;
+    LayerTriangles out_;
+    uint32_t face_ = 0;
+    Vec3d normal_{0};
+    std::vector<Corner> corner_;  // what is left of the face
+    std::vector<std::array<Corner, 3>> ears_;
+    std::vector<std::pair<uint32_t, uint32_t>> diagonals_;
+};
+
+}  // namespace
+
+LayerTriangles triangulate(const PolygonMesh& polygons, const FreePoint& free_point) {
+    return Triangulator(polygons, free_point).run();
+}
+
+}  // namespace pietra::cluster

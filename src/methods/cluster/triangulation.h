@@ -1,0 +1,26 @@
+#pragma once
+// The triangles of a layer: every polygon by itself, so that the whole stays a valid mesh. No
+// diagonal may join two vertices that are joined already in this cell, nor two that other cells
+// use, which might join them. Of the diagonals left, ears are cut where they look the polygon's way
+// and have the best shape. Where every one is refused, the polygon becomes a star around a point
+// that nobody else uses: a vertex of the input within the face, or else a free point of the
+// lattice.
+
+#include <functional>
+
+#include "methods/cluster/polygon_mesh.h"
+
+namespace pietra::cluster {
+
+/// Gives a lattice point that is no vertex of the model, and none given before, near another one.
+using FreePoint = std::function<Vec3i(const Vec3i& near)>;
+
+struct LayerTriangles {
+    Mesh mesh;  ///< edge classes, no normals; vertices are the polygons', then others
+    std::vector<uint32_t> face;  ///< of each triangle: the polygon
+    uint32_t stars = 0, free_points = 0;
+};
+
+LayerTriangles triangulate(const PolygonMesh& polygons, const FreePoint& free_point);
+
+}  // namespace pietra::cluster
