@@ -107,7 +107,7 @@ std::vector<uint16_t> randomLayers(const LayeredPiece& piece, uint64_t seed) {
 TEST(Cluster, EachLayerIsWhole) {
     for (const Input& input : kInputs) {
         const Mesh mesh = input.make();
-        for (const uint32_t vertices : {60u, 400u, 1u << 30}) {
+        for (const uint32_t vertices : {60u, 1u << 30}) {
             const LayeredPiece piece = buildLayers(mesh, smallCells(vertices));
             for (uint16_t layer = 0; layer <= piece.layers; ++layer) {
                 const Mesh whole = mixedMesh(piece, sameLayer(piece, layer));
@@ -122,9 +122,9 @@ TEST(Cluster, EachLayerIsWhole) {
 TEST(Cluster, AnyChoiceOfLayersIsWhole) {
     for (const Input& input : kInputs) {
         const Mesh mesh = input.make();
-        for (const uint32_t vertices : {20u, 100u, 500u}) {
+        for (const uint32_t vertices : {20u, 100u}) {
             const LayeredPiece piece = buildLayers(mesh, smallCells(vertices));
-            for (uint64_t seed = 0; seed < 12; ++seed) {
+            for (uint64_t seed = 0; seed < 6; ++seed) {
                 const Mesh mixed = mixedMesh(piece, randomLayers(piece, seed));
                 const CrackCount cracks = countCracks(mixed, mesh, input.orientable);
                 EXPECT_TRUE(cracks.ok()) << input.name << ", cells of " << vertices << ", choice "

@@ -179,7 +179,7 @@ bool Interfaces::mayBeRemoved(uint32_t v) const {
            !std::binary_search(joined_.begin(), joined_.end(), pairKey(a, b));
 }
 
-/// What both cells can do without. In conflict are vertices with a common face.
+/// What both cells can do without, and which of these exclude each other, neighbours apart.
 std::vector<Interfaces::Candidate> Interfaces::candidates(
     std::span<const PolygonMesh> cells, std::vector<std::array<uint32_t, 2>>& conflicts) const {
     std::vector<uint8_t> votes(position_.size(), 0);
@@ -193,13 +193,17 @@ std::vector<Interfaces::Candidate> Interfaces::candidates(
                 ++votes[cell.name[v]];
                 voted.push_back(cell.name[v]);
             }
+        // A face that loses one corner of five or more is a face all the same; where faces merge
+        // around a corner, nothing else is removed from them.
         for (uint32_t f = 0; f < cell.faceCount(); ++f) {
             at_face.clear();
             for (uint32_t h = cell.face_begin[f]; h < cell.face_begin[f + 1]; ++h)
-                if (votes[cell.name[cell.corner[h]]]) at_face.push_back(cell.name[cell.corner[h]]);
+                if (votes[cell.name[cell.corner[h]]]) at_face.push_back(cell.corner[h]);
             for (const uint32_t p : at_face)
                 for (const uint32_t q : at_face)
-                    if (p != q) conflicts.push_back({p, q});
+                    if (p != q && (cell.corners(f) < 5 || corners.at(p).size() > 1 ||
+                                   corners.at(q).size() > 1))
+                        conflicts.push_back({cell.name[p], cell.name[q]});
         }
     }
     std::vector<Candidate> both;

@@ -5,6 +5,7 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "base/stopwatch.h"
 #include "geometry/lattice.h"
 #include "methods/cluster/anchors.h"
 #include "methods/cluster/octree_cells.h"
@@ -42,10 +43,11 @@ PolygonMesh cellMesh(const Mesh& model, std::span<const uint32_t> triangles,
 /// Lattice points that are no vertices.
 class FreePoints {
 public:
-    explicit FreePoints(const std::vector<Vec3i>& taken) {
-        for (const Vec3i& p : taken) taken_.insert(latticeKey(p));
-    }
+    explicit FreePoints(const std::vector<Vec3i>& vertices) : vertices_(vertices) {}
+    /// Near another one, and none given before.
     Vec3i near(const Vec3i& wanted) {
+        if (taken_.empty())
+            for (const Vec3i& p : vertices_) taken_.insert(latticeKey(p));
         for (int32_t reach = 0;; ++reach)
             for (int32_t x = -reach; x <= reach; ++x)
                 for (int32_t y = -reach; y <= reach; ++y)
@@ -57,7 +59,8 @@ public:
     }
 
 private:
-    std::unordered_set<uint64_t> taken_;
+    const std::vector<Vec3i>& vertices_;
+    std::unordered_set<uint64_t> taken_;  // filled when it is first asked for
 };
 
 PolygonMesh nextLayer(const PolygonMesh& below, std::span<const uint8_t> removed,
@@ -78,28 +81,35 @@ void append(Mesh& to, const Mesh& from) {
 }  // namespace
 
 LayeredPiece buildLayers(const Mesh& mesh, const LayerSettings& settings) {
+    LayeredPiece piece{mesh.position, {}, {}, settings.layers, {}};
+    Stopwatch watch;
+    const auto spend = [&](double& seconds) { seconds += 1e-3 * watch.lapMs(); };
     const CellTriangles cells = octreeCells(mesh, settings.cell_vertices);
     Interfaces interfaces(mesh, cells);
-    FreePoints points(mesh.position);
-    const FreePoint free_point = [&points](const Vec3i& p) { return points.near(p); };
-    LayeredPiece piece{
-        mesh.position, std::vector<CellLayers>(cells.of_cell.size()), {}, settings.layers};
-    std::vector<PolygonMesh> current(cells.of_cell.size());
-    parallelFor(current.size(),
+    const size_t count = cells.of_cell.size();
+    std::vector<PolygonMesh> current(count);
+    parallelFor(count,
                 [&](size_t c) { current[c] = cellMesh(mesh, cells.of_cell[c], interfaces); });
-    const auto storeLayer = [&] {
-        for (size_t c = 0; c < current.size(); ++c)
-            piece.cell[c].layer.push_back(triangulate(current[c], free_point));
-    };
-    storeLayer();
-    for (uint16_t layer = 1; layer <= settings.layers; ++layer) {
-        interfaces.removeFor(layer, current);
-        const uint32_t faces_each = layer == 1 ? settings.first_faces : settings.faces;
-        parallelFor(current.size(), [&](size_t c) {
+    spend(piece.seconds.cells);
+    piece.cell.resize(count);
+    FreePoints free_points(mesh.position);
+    for (uint16_t layer = 0;; ++layer) {
+        parallelFor(count,
+                    [&](size_t c) { piece.cell[c].layer.push_back(triangulate(current[c])); });
+        for (CellLayers& cell : piece.cell)
+            for (const uint32_t v : cell.layer.back().to_free)
+                cell.layer.back().mesh.position[v] =
+                    free_points.near(cell.layer.back().mesh.position[v]);
+        spend(piece.seconds.triangles);
+        if (layer == settings.layers) break;
+        interfaces.removeFor(uint16_t(layer + 1), current);
+        spend(piece.seconds.interfaces);
+        const uint32_t faces_each = layer == 0 ? settings.first_faces : settings.faces;
+        parallelFor(count, [&](size_t c) {
             current[c] =
                 nextLayer(current[c], interfaces.justRemoved(), faces_each, settings.clustering);
         });
-        storeLayer();
+        spend(piece.seconds.faces);
     }
     piece.strips = interfaces.strips();
     return piece;

@@ -30,6 +30,9 @@ struct LayeredPiece {
     std::vector<CellLayers> cell;
     std::vector<Strip> strips;  ///< by layer
     uint16_t layers = 0;        ///< above layer 0
+    struct {
+        double cells = 0, interfaces = 0, faces = 0, triangles = 0;
+    } seconds;  ///< of the stages
 };
 
 /// `mesh` is the whole model, with edge classes, welded.

@@ -67,7 +67,7 @@ CellTriangles octreeCells(const Mesh& mesh, uint32_t most_vertices) {
     std::vector<std::vector<std::pair<uint64_t, uint32_t>>> sorted(division.count());
     for (uint32_t t = 0; t < mesh.triangleCount(); ++t) {
         const auto [a, b, c] = mesh.triangle[t];
-        const uint32_t cell = cell_of[b] == cell_of[c] ? cell_of[b] : cell_of[a];
+        const uint32_t cell = std::max({cell_of[a], cell_of[b], cell_of[c]});
         const Vec3i middle = (mesh.position[a] + mesh.position[b] + mesh.position[c]) / 3;
         sorted[cell].push_back({mortonCode(middle), t});
     }

@@ -1,6 +1,8 @@
 #pragma once
-// The octree partition of Wu and Huang 2014, section 5.1. Vertices lie in a cell; a triangle
-// belongs to the cell of two of its vertices or more, or else to that of its first one. In memory.
+// The octree partition of Wu and Huang 2014, section 5.1, but for the paper's second and third
+// rule. Vertices lie in a cell; a triangle belongs to the last of the cells of its vertices. The
+// paper's majority makes zigzags, as a row of triangles between two cells is shared out by turns:
+// twice as long interfaces, of which no vertex may leave before its triangle does. In memory.
 
 #include <vector>
 

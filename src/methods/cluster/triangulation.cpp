@@ -54,8 +54,8 @@ int64_t turn(const Corner& a, const Corner& b, const Corner& c) {
 
 class Triangulator {
 public:
-    Triangulator(const PolygonMesh& polygons, const FreePoint& free_point)
-        : polygons_(polygons), free_point_(free_point), joined_(polygons.halfEdgeCount()) {
+    explicit Triangulator(const PolygonMesh& polygons)
+        : polygons_(polygons), joined_(polygons.halfEdgeCount()) {
         for (uint32_t h = 0; h < polygons.halfEdgeCount(); ++h)
             joined_.add(polygons.corner[h], polygons.end(h));
         out_.mesh.position = polygons.position;
@@ -142,9 +142,9 @@ private:
         if (const uint32_t m = polygons_.middle[face_]; m != kNone) {
             out_.mesh.position.push_back(polygons_.inner_position[m]);
         } else {
-            ++out_.free_points;
-            const Vec3d near = polygons_.shape[face_].centroid();
-            out_.mesh.position.push_back(free_point_(Vec3i(glm::floor(near + 0.5))));
+            out_.to_free.push_back(centre);
+            out_.mesh.position.push_back(
+                Vec3i(glm::floor(polygons_.shape[face_].centroid() + 0.5)));
         }
         for (size_t i = 0; i < corner_.size(); ++i) {
             Corner a = corner_[i], b = corner_[(i + 1) % corner_.size()];
@@ -166,7 +166,6 @@ private:
     }
 
     const PolygonMesh& polygons_;
-    const FreePoint& free_point_;
     Joined joined_;
     LayerTriangles out_;
     uint32_t face_ = 0;
@@ -178,8 +177,8 @@ private:
 
 }  // namespace
 
-LayerTriangles triangulate(const PolygonMesh& polygons, const FreePoint& free_point) {
-    return Triangulator(polygons, free_point).run();
+LayerTriangles triangulate(const PolygonMesh& polygons) {
+    return Triangulator(polygons).run();
 }
 
 }  // namespace pietra::cluster

@@ -6,21 +6,19 @@
 // that nobody else uses: a vertex of the input within the face, or else a free point of the
 // lattice.
 
-#include <functional>
-
 #include "methods/cluster/polygon_mesh.h"
 
 namespace pietra::cluster {
 
-/// Gives a lattice point that is no vertex of the model, and none given before, near another one.
-using FreePoint = std::function<Vec3i(const Vec3i& near)>;
-
 struct LayerTriangles {
-    Mesh mesh;  ///< edge classes, no normals; vertices are the polygons', then others
+    Mesh mesh;                   ///< edge classes, no normals; the polygons' vertices, then others
     std::vector<uint32_t> face;  ///< of each triangle: the polygon
-    uint32_t stars = 0, free_points = 0;
+    uint32_t stars = 0;
+    /// Vertices of `mesh` that lie where a free point of the lattice would be best, and are to be
+    /// moved to one.
+    std::vector<uint32_t> to_free;
 };
 
-LayerTriangles triangulate(const PolygonMesh& polygons, const FreePoint& free_point);
+LayerTriangles triangulate(const PolygonMesh& polygons);
 
 }  // namespace pietra::cluster
