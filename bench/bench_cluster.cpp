@@ -58,9 +58,10 @@ int main(int count, char** arguments) {
         std::printf("%s: %zu triangles, %zu cells, %zu strips; %.2f s, %.0f k triangles/s\n",
                     arguments[i], mesh.triangleCount(), piece.cell.size(), piece.strips.size(),
                     seconds, 1e-3 * double(mesh.triangleCount()) / seconds);
-        std::printf("  cells %.2f s, interfaces %.2f s, faces %.2f s, triangles %.2f s\n",
-                    piece.seconds.cells, piece.seconds.interfaces, piece.seconds.faces,
-                    piece.seconds.triangles);
+        std::printf(
+            "  cells %.2f s, interfaces %.2f s, faces %.2f s, triangles %.2f s, errors %.2f s\n",
+            piece.seconds.cells, piece.seconds.interfaces, piece.seconds.faces,
+            piece.seconds.triangles, piece.seconds.errors);
         for (uint16_t layer = 0; layer <= piece.layers; ++layer) {
             size_t triangles = 0, stars = 0, free_points = 0;
             for (const CellLayers& cell : piece.cell) {
@@ -68,6 +69,9 @@ int main(int count, char** arguments) {
                 stars += cell.layer[layer].stars;
                 free_points += cell.layer[layer].to_free.size();
             }
+            std::vector<float> errors;
+            for (const CellLayers& cell : piece.cell) errors.push_back(cell.error[layer]);
+            std::sort(errors.begin(), errors.end());
             const auto strips =
                 std::count_if(piece.strips.begin(), piece.strips.end(),
                               [&](const Strip& strip) { return strip.layer == layer; });

@@ -248,7 +248,7 @@ void Interfaces::remove(uint32_t v) {
     pinned_[v] = 1;
 }
 
-PolygonMesh withoutRemoved(const PolygonMesh& cell, std::span<const uint8_t> removed) {
+Groups fansWithout(const PolygonMesh& cell, std::span<const uint8_t> removed) {
     DisjointSets fans(cell.faceCount());
     std::vector<uint32_t> first(cell.vertexCount(), kNone);
     for (uint32_t h = 0; h < cell.halfEdgeCount(); ++h) {
@@ -260,9 +260,7 @@ PolygonMesh withoutRemoved(const PolygonMesh& cell, std::span<const uint8_t> rem
     Groups groups;
     for (uint32_t f = 0; f < cell.faceCount(); ++f)
         groups.of_face.push_back(fans.root(f) == f ? groups.count++ : groups.of_face[fans.root(f)]);
-    std::vector<uint8_t> keep;
-    for (const uint32_t name : cell.name) keep.push_back(!removed[name]);
-    return mergeFaces(cell, groups, keep);
+    return groups;
 }
 
 }  // namespace pietra::cluster

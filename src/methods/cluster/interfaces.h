@@ -68,7 +68,7 @@ private:
     std::vector<Strip> strips_;
 };
 
-/// The next layer of a cell before clustering: without the vertices removed from its interfaces.
-PolygonMesh withoutRemoved(const PolygonMesh& cell, std::span<const uint8_t> removed);
+/// Faces of a cell that become one as vertices leave its interfaces.
+Groups fansWithout(const PolygonMesh& cell, std::span<const uint8_t> removed);
 
 }  // namespace pietra::cluster

@@ -9,6 +9,7 @@
 #include "geometry/lattice.h"
 #include "methods/cluster/anchors.h"
 #include "methods/cluster/octree_cells.h"
+#include "simplify/deviation.h"
 
 namespace pietra::cluster {
 
@@ -63,11 +64,72 @@ private:
     std::unordered_set<uint64_t> taken_;  // filled when it is first asked for
 };
 
+/// `super_face`: of each face below, its face in the result.
 PolygonMesh nextLayer(const PolygonMesh& below, std::span<const uint8_t> removed,
-                      uint32_t faces_each, const ClusterSettings& settings) {
-    const PolygonMesh polygons = withoutRemoved(below, removed);
+                      uint32_t faces_each, const ClusterSettings& settings,
+                      std::vector<uint32_t>& super_face) {
+    const Groups fans = fansWithout(below, removed);
+    std::vector<uint8_t> stays;
+    for (const uint32_t name : below.name) stays.push_back(!removed[name]);
+    const PolygonMesh polygons = mergeFaces(below, fans, stays);
     const Groups groups = clusterFaces(polygons, below.faceCount() / faces_each, settings);
+    super_face.clear();
+    for (const uint32_t fan : fans.of_face) super_face.push_back(groups.of_face[fan]);
     return mergeFaces(polygons, groups, findAnchors(polygons, groups));
+}
+
+/// Where to look for what became of each triangle: among those of its super face, by turns.
+std::vector<uint32_t> triangleMap(const LayerTriangles& below, const LayerTriangles& layer,
+                                  std::span<const uint32_t> super_face) {
+    std::vector<uint32_t> first(layer.face.empty() ? 1 : layer.face.back() + 2, 0), next, map;
+    for (const uint32_t f : layer.face) ++first[f + 1];
+    for (size_t f = 1; f < first.size(); ++f) first[f] += first[f - 1];
+    next = first;
+    for (const uint32_t f : below.face) {
+        const uint32_t s = super_face[f];
+        if (next[s] == first[s + 1]) next[s] = first[s];
+        map.push_back(next[s]++);
+    }
+    return map;
+}
+
+/// The bounds of a cell's layer, from those below.
+void boundLayer(CellLayers& cell, std::span<const uint32_t> super_face, FaceBounds& bounds,
+                Deviation& deviation) {
+    const LayerTriangles& layer = cell.layer.back();
+    if (cell.layer.size() == 1) {
+        bounds.to_original.assign(layer.mesh.triangleCount(), 0);
+        bounds.from_original = bounds.to_original;
+        cell.error.push_back(0);
+        return;
+    }
+    const LayerTriangles& below = cell.layer[cell.layer.size() - 2];
+    const std::vector<uint32_t> map = triangleMap(below, layer, super_face);
+    DeviationInput step;
+    step.before = &below.mesh;
+    step.before_bounds = &bounds;
+    step.after = &layer.mesh;
+    step.triangle_map = map;
+    step.child_error = cell.error.back();
+    FaceBounds after;
+    const float error = deviation.run(step, after);
+    bounds = std::move(after);
+    cell.error.push_back(std::max(error, cell.error.back()));
+}
+
+/// What strips add: they lie within their height of edges of the layer below.
+void boundStrips(LayeredPiece& piece, uint16_t layer) {
+    for (const Strip& strip : piece.strips) {
+        if (strip.layer != layer) continue;
+        const Vec3d a(piece.position[strip.before]), b(piece.position[strip.after]);
+        const Vec3d p(piece.position[strip.removed]), edge = b - a;
+        const double t = std::clamp(glm::dot(p - a, edge) / glm::dot(edge, edge), 0.0, 1.0);
+        const float height = float(glm::length(p - a - t * edge) * (1 + 1e-6));
+        for (const uint32_t c : strip.cells) {
+            std::vector<float>& error = piece.cell[c].error;
+            error[layer] = std::max(error[layer], error[layer - 1u] * (1 + 1e-6f) + height);
+        }
+    }
 }
 
 void append(Mesh& to, const Mesh& from) {
@@ -88,6 +150,9 @@ LayeredPiece buildLayers(const Mesh& mesh, const LayerSettings& settings) {
     Interfaces interfaces(mesh, cells);
     const size_t count = cells.of_cell.size();
     std::vector<PolygonMesh> current(count);
+    std::vector<std::vector<uint32_t>> super_face(count);
+    std::vector<FaceBounds> bounds(count);
+    PerThread<Deviation> deviation;
     parallelFor(count,
                 [&](size_t c) { current[c] = cellMesh(mesh, cells.of_cell[c], interfaces); });
     spend(piece.seconds.cells);
@@ -101,18 +166,22 @@ LayeredPiece buildLayers(const Mesh& mesh, const LayerSettings& settings) {
                 cell.layer.back().mesh.position[v] =
                     free_points.near(cell.layer.back().mesh.position[v]);
         spend(piece.seconds.triangles);
-        if (layer == settings.layers) break;
+        parallelFor(count, [&](size_t c) {
+            boundLayer(piece.cell[c], super_face[c], bounds[c], deviation.local());
+        });
+        boundStrips(piece, layer);
+        spend(piece.seconds.errors);
+        if (layer == settings.layers) return piece;
         interfaces.removeFor(uint16_t(layer + 1), current);
+        piece.strips = interfaces.strips();
         spend(piece.seconds.interfaces);
         const uint32_t faces_each = layer == 0 ? settings.first_faces : settings.faces;
         parallelFor(count, [&](size_t c) {
-            current[c] =
-                nextLayer(current[c], interfaces.justRemoved(), faces_each, settings.clustering);
+            current[c] = nextLayer(current[c], interfaces.justRemoved(), faces_each,
+                                   settings.clustering, super_face[c]);
         });
         spend(piece.seconds.faces);
     }
-    piece.strips = interfaces.strips();
-    return piece;
 }
 
 Mesh mixedMesh(const LayeredPiece& piece, std::span<const uint16_t> layer_of_cell,

@@ -23,6 +23,9 @@ struct LayerSettings {
 
 struct CellLayers {
     std::vector<LayerTriangles> layer;  ///< layer 0 first
+    /// Of each layer and its strips to finer ones: a bound of the distance to layer 0, both ways,
+    /// in lattice units (docs/design/error.md). Never decreases.
+    std::vector<float> error;
 };
 
 struct LayeredPiece {
@@ -31,7 +34,7 @@ struct LayeredPiece {
     std::vector<Strip> strips;  ///< by layer
     uint16_t layers = 0;        ///< above layer 0
     struct {
-        double cells = 0, interfaces = 0, faces = 0, triangles = 0;
+        double cells = 0, interfaces = 0, faces = 0, triangles = 0, errors = 0;
     } seconds;  ///< of the stages
 };
 
