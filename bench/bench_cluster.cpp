@@ -75,8 +75,11 @@ int main(int count, char** arguments) {
             const auto strips =
                 std::count_if(piece.strips.begin(), piece.strips.end(),
                               [&](const Strip& strip) { return strip.layer == layer; });
-            std::printf("  layer %u: %zu triangles, %zu stars, %zu free points, %zu strips\n",
-                        layer, triangles, stars, free_points, size_t(strips));
+            std::printf(
+                "  layer %u: %zu triangles, %zu stars, %zu free points, %zu strips; a cell's error:"
+                " median %.1f, most %.1f\n",
+                layer, triangles, stars, free_points, size_t(strips),
+                double(errors[errors.size() / 2]), double(errors.back()));
         }
     }
 }

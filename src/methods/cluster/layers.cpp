@@ -1,6 +1,7 @@
 #include "methods/cluster/layers.h"
 
 #include <algorithm>
+#include <cmath>
 #include <unordered_set>
 
 #include "base/check.h"
@@ -10,6 +11,7 @@
 #include "methods/cluster/anchors.h"
 #include "methods/cluster/octree_cells.h"
 #include "simplify/deviation.h"
+#include "simplify/deviation_direction.h"
 
 namespace pietra::cluster {
 
@@ -117,19 +119,46 @@ void boundLayer(CellLayers& cell, std::span<const uint32_t> super_face, FaceBoun
     cell.error.push_back(std::max(error, cell.error.back()));
 }
 
-/// What strips add: they lie within their height of edges of the layer below.
-void boundStrips(LayeredPiece& piece, uint16_t layer) {
-    for (const Strip& strip : piece.strips) {
-        if (strip.layer != layer) continue;
-        const Vec3d a(piece.position[strip.before]), b(piece.position[strip.after]);
-        const Vec3d p(piece.position[strip.removed]), edge = b - a;
-        const double t = std::clamp(glm::dot(p - a, edge) / glm::dot(edge, edge), 0.0, 1.0);
-        const float height = float(glm::length(p - a - t * edge) * (1 + 1e-6));
-        for (const uint32_t c : strip.cells) {
-            std::vector<float>& error = piece.cell[c].error;
-            error[layer] = std::max(error[layer], error[layer - 1u] * (1 + 1e-6f) + height);
-        }
+/// Bounds of the strips' distance to layer 0 by what a cell has below the layer at which they
+/// appear: by the first of a strip's cells and by the second.
+void boundStrips(const LayeredPiece& piece, std::span<const Strip> strips, uint32_t cell,
+                 const FaceBounds& below, std::array<std::vector<float>, 2>& bound) {
+    std::vector<size_t> own;
+    Mesh mesh;
+    for (size_t i = 0; i < strips.size(); ++i) {
+        if (strips[i].cells[0] != cell && strips[i].cells[1] != cell) continue;
+        own.push_back(i);
+        const uint32_t base = uint32_t(mesh.position.size());
+        for (const uint32_t v : {strips[i].before, strips[i].removed, strips[i].after})
+            mesh.position.push_back(piece.position[v]);
+        mesh.triangle.push_back({base, base + 1, base + 2});
     }
+    if (own.empty()) return;
+    deviation::Surface source, target;
+    source.assign(mesh);
+    target.assign(piece.cell[cell].layer.back().mesh);
+    std::vector<float> value(own.size(), 0);
+    deviation::Direction direction;
+    deviation::Progressing progress{piece.cell[cell].error.back(), 0};
+    direction.begin(source, target, {}, below.from_original, value, false);
+    for (uint32_t t = 0; t < own.size(); ++t) {
+        const Vec3f origin = source.corner(t, 0);
+        const Vec3f middle = (source.corner(t, 1) - origin + source.corner(t, 2) - origin) / 3.0f;
+        direction.cover(t, target.nearest(origin, middle, {}, {0, HUGE_VALF}).face, progress);
+    }
+    direction.finish(progress);
+    for (size_t i = 0; i < own.size(); ++i)
+        bound[strips[own[i]].cells[0] == cell ? 0 : 1][own[i]] = value[i];
+}
+
+/// For both cells of a strip, the better of its two bounds counts.
+void addStrips(LayeredPiece& piece, std::span<const Strip> strips,
+               const std::array<std::vector<float>, 2>& bound) {
+    for (size_t i = 0; i < strips.size(); ++i)
+        for (const uint32_t c : strips[i].cells) {
+            float& error = piece.cell[c].error.back();
+            error = std::max(error, std::min(bound[0][i], bound[1][i]));
+        }
 }
 
 void append(Mesh& to, const Mesh& from) {
@@ -153,6 +182,8 @@ LayeredPiece buildLayers(const Mesh& mesh, const LayerSettings& settings) {
     std::vector<std::vector<uint32_t>> super_face(count);
     std::vector<FaceBounds> bounds(count);
     PerThread<Deviation> deviation;
+    std::span<const Strip> strips;  // those of the layer in work
+    std::array<std::vector<float>, 2> strip_bound;
     parallelFor(count,
                 [&](size_t c) { current[c] = cellMesh(mesh, cells.of_cell[c], interfaces); });
     spend(piece.seconds.cells);
@@ -169,11 +200,17 @@ LayeredPiece buildLayers(const Mesh& mesh, const LayerSettings& settings) {
         parallelFor(count, [&](size_t c) {
             boundLayer(piece.cell[c], super_face[c], bounds[c], deviation.local());
         });
-        boundStrips(piece, layer);
+        addStrips(piece, strips, strip_bound);
         spend(piece.seconds.errors);
         if (layer == settings.layers) return piece;
         interfaces.removeFor(uint16_t(layer + 1), current);
+        const size_t had = piece.strips.size();
         piece.strips = interfaces.strips();
+        strips = std::span(piece.strips).subspan(had);
+        for (auto& side : strip_bound) side.assign(strips.size(), 0);
+        parallelFor(count, [&](size_t c) {
+            boundStrips(piece, strips, uint32_t(c), bounds[c], strip_bound);
+        });
         spend(piece.seconds.interfaces);
         const uint32_t faces_each = layer == 0 ? settings.first_faces : settings.faces;
         parallelFor(count, [&](size_t c) {
