@@ -3,10 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
+#include <numeric>
 #include <random>
 
+#include "base/hash.h"
 #include "base/parallel.h"
+#include "methods/cluster/anchors.h"
 #include "methods/cluster/cluster_testing.h"
 #include "methods/cluster/layers.h"
 #include "simplify/test_meshes.h"
@@ -130,6 +134,87 @@ TEST(Cluster, AnyChoiceOfLayersIsWhole) {
                 EXPECT_TRUE(cracks.ok()) << input.name << ", cells of " << vertices << ", choice "
                                          << seed << ": " << cracks.text();
             }
+        }
+    }
+}
+
+/// Eight triangles a cell: nearly everything is at an interface.
+TEST(Cluster, TinyCells) {
+    for (const Input& input : kInputs) {
+        const Mesh mesh = input.make();
+        const LayeredPiece piece = buildLayers(mesh, smallCells(5));
+        for (uint64_t seed = 0; seed < 3; ++seed) {
+            const CrackCount cracks =
+                countCracks(mixedMesh(piece, randomLayers(piece, seed)), mesh, input.orientable);
+            EXPECT_TRUE(cracks.ok()) << input.name << ", " << seed << ": " << cracks.text();
+        }
+    }
+}
+
+/// Triangles by cellAt(middle of a triangle).
+template <class CellAt>
+CellTriangles cellsBy(const Mesh& mesh, size_t count, CellAt&& cellAt) {
+    CellTriangles cells{std::vector<std::vector<uint32_t>>(count)};
+    for (uint32_t t = 0; t < mesh.triangleCount(); ++t) {
+        Vec3d middle(0);
+        for (const uint32_t v : mesh.triangle[t]) middle += Vec3d(mesh.position[v]) / 3.0;
+        cells.of_cell[cellAt(middle)].push_back(t);
+    }
+    std::erase_if(cells.of_cell, [](const auto& list) { return list.empty(); });
+    return cells;
+}
+
+/// Cells from pole to pole: four interfaces with the same two ends, down to the last vertex. And
+/// slabs, whose interfaces are closed.
+TEST(Cluster, InterfacesShareEndsOrHaveNone) {
+    const Mesh mesh = test::toLattice(test::sphereShape(16), 1 << 16);
+    const double half = 0.5 * (1 << 16), centre = 1000 + half;
+    const auto lune = [&](const Vec3d& p) {
+        return size_t((p.x > centre) + (p.x > centre) + ((p.y > centre) == (p.x > centre)));
+    };
+    const auto slab = [&](const Vec3d& p) { return size_t((p.z - 1000) / half * 2.5); };
+    for (const CellTriangles& cells : {cellsBy(mesh, 4, lune), cellsBy(mesh, 6, slab)}) {
+        LayerSettings settings = smallCells(0);
+        settings.layers = 16;
+        const LayeredPiece piece = buildLayers(mesh, cells, settings);
+        for (uint64_t seed = 0; seed < 40; ++seed) {
+            const CrackCount cracks =
+                countCracks(mixedMesh(piece, randomLayers(piece, seed)), mesh, true);
+            EXPECT_TRUE(cracks.ok()) << cracks.text();
+        }
+    }
+}
+
+/// Cells in crumbs, that touch themselves and enclose each other.
+TEST(Cluster, AnyPartitionWillDo) {
+    for (const Input& input : kInputs) {
+        const Mesh mesh = input.make();
+        for (const uint64_t grain : {1u, 40u, 400u}) {
+            CellTriangles cells{std::vector<std::vector<uint32_t>>(6)};
+            for (uint32_t t = 0; t < mesh.triangleCount(); ++t)
+                cells.of_cell[mixBits(t / grain) % 6].push_back(t);
+            std::erase_if(cells.of_cell, [](const auto& list) { return list.empty(); });
+            const LayeredPiece piece = buildLayers(mesh, cells, smallCells(0));
+            const CrackCount cracks =
+                countCracks(mixedMesh(piece, randomLayers(piece, grain)), mesh, input.orientable);
+            EXPECT_TRUE(cracks.ok()) << input.name << ", " << grain << ": " << cracks.text();
+        }
+    }
+}
+
+TEST(Cluster, PolygonsKeepTheirInvariants) {
+    for (const Input& input : kInputs) {
+        const Mesh mesh = input.make();
+        const CellTriangles one = octreeCells(mesh, 1u << 30);
+        const Interfaces none(mesh, one);
+        std::vector<uint32_t> names(mesh.vertexCount());
+        std::iota(names.begin(), names.end(), 0u);
+        PolygonMesh layer = polygonsOf(mesh, names, none.atInterface(), none.irregular());
+        EXPECT_EQ(faultOf(layer), "") << input.name;
+        for (int i = 0; i < 5; ++i) {
+            const Groups groups = clusterFaces(layer, layer.faceCount() / 4 + 1);
+            layer = mergeFaces(layer, groups, findAnchors(layer, groups));
+            EXPECT_EQ(faultOf(layer), "") << input.name << ", step " << i;
         }
     }
 }

@@ -193,16 +193,15 @@ std::vector<Interfaces::Candidate> Interfaces::candidates(
                 ++votes[cell.name[v]];
                 voted.push_back(cell.name[v]);
             }
-        // A face that loses one corner of five or more is a face all the same; where faces merge
-        // around a corner, nothing else is removed from them.
+        // A face may lose several corners: as no two are neighbours, and not both neighbours of one
+        // are pinned, three stay. Where faces merge around one, nothing else leaves them.
         for (uint32_t f = 0; f < cell.faceCount(); ++f) {
             at_face.clear();
             for (uint32_t h = cell.face_begin[f]; h < cell.face_begin[f + 1]; ++h)
                 if (votes[cell.name[cell.corner[h]]]) at_face.push_back(cell.corner[h]);
             for (const uint32_t p : at_face)
                 for (const uint32_t q : at_face)
-                    if (p != q && (cell.corners(f) < 5 || corners.at(p).size() > 1 ||
-                                   corners.at(q).size() > 1))
+                    if (p != q && (corners.at(p).size() > 1 || corners.at(q).size() > 1))
                         conflicts.push_back({cell.name[p], cell.name[q]});
         }
     }

@@ -172,10 +172,19 @@ void append(Mesh& to, const Mesh& from) {
 }  // namespace
 
 LayeredPiece buildLayers(const Mesh& mesh, const LayerSettings& settings) {
+    const Stopwatch watch;
+    const CellTriangles cells = octreeCells(mesh, settings.cell_vertices);
+    const double seconds = watch.seconds();
+    LayeredPiece piece = buildLayers(mesh, cells, settings);
+    piece.seconds.cells += seconds;
+    return piece;
+}
+
+LayeredPiece buildLayers(const Mesh& mesh, const CellTriangles& cells,
+                         const LayerSettings& settings) {
     LayeredPiece piece{mesh.position, {}, {}, settings.layers, {}};
     Stopwatch watch;
     const auto spend = [&](double& seconds) { seconds += 1e-3 * watch.lapMs(); };
-    const CellTriangles cells = octreeCells(mesh, settings.cell_vertices);
     Interfaces interfaces(mesh, cells);
     const size_t count = cells.of_cell.size();
     std::vector<PolygonMesh> current(count);

@@ -38,7 +38,10 @@ struct LayeredPiece {
     } seconds;  ///< of the stages
 };
 
-/// `mesh` is the whole model, with edge classes, welded.
+/// `mesh` is the whole model, with edge classes, welded. Any partition will do.
+LayeredPiece buildLayers(const Mesh& mesh, const CellTriangles& cells,
+                         const LayerSettings& settings);
+/// With octree cells.
 LayeredPiece buildLayers(const Mesh& mesh, const LayerSettings& settings);
 
 /// A layer for each cell. Vertices are not shared between cells; there are no normals.
