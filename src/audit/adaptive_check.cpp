@@ -130,6 +130,7 @@ private:
             input.emplace(*source, budget_, budget_.available() / 3, settings_.temp_dir);
             truth = truthOfInput(*input, reader_.info().lattice, reader_.info().input_triangles);
         }
+        report_.certificate.against_input = input.has_value();
         std::vector<CertificateReport> by_error;
         for (size_t i = 0; i < requests.size(); ++i) {
             CertificateReport found = audit(model_.cut(requests[i], budget_), truth);

@@ -139,6 +139,7 @@ private:
         const std::vector<CertificateReport> reports =
             auditCertificate(model_.nodes(), cuts, stream_, truth, options, budget_);
         CertificateSummary& sum = report_.certificate;
+        sum.against_input = bool(input_);
         sum.cuts = cuts.size();
         for (const CertificateReport& report : reports) {
             sum.samples += report.samples();

@@ -39,6 +39,7 @@ struct CutsReport {
 };
 
 struct CertificateSummary {
+    bool against_input = false;  ///< else against the finest cut
     uint64_t cuts = 0, samples = 0, violations = 0;
     double worst_ratio = 0;  ///< largest distance / stated error
     std::vector<TightnessRow> tightness;

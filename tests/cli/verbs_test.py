@@ -194,6 +194,9 @@ class Shown(VerbTest):
         info = self.report("info", "fine.pietra", "--json")
         self.assertEqual(info["method"], "pmesh")
         self.assertTrue(self.report("check", "fine.pietra", "--input", "statue.ply", "--json")["ok"])
+        for of, extra in (("input", ["--input", "statue.ply"]), ("finest cut", [])):
+            said = self.run_pietra("check", "fine.pietra", *extra).stdout
+            self.assertIn(f"against the {of}", said)
         full = self.extract("fine", "--full")
         self.assertEqual(len(full[2]), info["input"]["triangles"])
         few = self.extract("fine", "--triangles", "1000")

@@ -94,8 +94,8 @@ std::string toText(const ModelCheckReport& report) {
             "certificate  {} samples of {} cuts against the {}, {} violations; farthest {:.3f} of "
             "the stated error\n",
             report.certificate.samples, report.certificate.cuts,
-            report.input ? "input" : "finest cut", report.certificate.violations,
-            report.certificate.worst_ratio);
+            report.certificate.against_input ? "input" : "finest cut",
+            report.certificate.violations, report.certificate.worst_ratio);
     return text + (report.ok() ? "ok\n" : "FAULTY\n");
 }
 
