@@ -44,7 +44,7 @@ void fuzzBase(std::span<const std::byte> bytes) {
     NodeForest forest;
     forest.row.resize(3);
     std::string fault;
-    if (!decodeBase(bytes, forest, fault)) CHECK(!fault.empty());
+    if (!decodeBase(bytes, kMethodFormat, forest, fault)) CHECK(!fault.empty());
 }
 
 void writeSeeds(const std::string& directory) {

@@ -79,6 +79,9 @@ size_t peakResidentBytes() {
 void shareHeap() {
     ::mallopt(M_ARENA_MAX, 1);
 }
+void trimHeap() {
+    ::malloc_trim(0);
+}
 
 size_t machineMemoryBytes() {
     size_t bytes = size_t(sysconf(_SC_PHYS_PAGES)) * size_t(sysconf(_SC_PAGE_SIZE));

@@ -55,10 +55,14 @@ private:
 /// Resident set of this process, now and at its peak (VmRSS, VmHWM), in bytes.
 size_t residentBytes();
 size_t peakResidentBytes();
-/// Has threads that are yet to come allocate from one heap: what one of them frees, another can use,
-/// so the resident set stays near what is in use. For programs that are to keep a budget while some
-/// threads load and others drop.
+/// Has threads that are yet to come allocate from one heap: what one of them frees, another can
+/// use, so the resident set stays near what is in use. For programs that are to keep a budget while
+/// some threads load and others drop.
 void shareHeap();
+/// Gives back what is free between what is used: where threads make large results for another one,
+/// several times as much as these take. A millisecond or so, and what is used next has to be
+/// fetched again.
+void trimHeap();
 /// Physical memory of the machine or the cgroup's limit, whichever is smaller, in bytes.
 size_t machineMemoryBytes();
 

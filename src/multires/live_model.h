@@ -35,12 +35,15 @@ public:
 /// A part of the mesh that is drawn, by itself: vertices on its border are in others, too.
 struct LiveChunk {
     Mesh mesh;
-    Sphere bounds;         ///< of its vertices, lattice units
+    Box3i box;             ///< of its vertices, lattice units
+    Sphere bounds;         ///< likewise
     uint64_t version = 0;  ///< another one when the mesh has changed; 0: it is empty
     /// The largest error that is stated of a part of it and not refined any more, and its sphere.
     float error = 0;
     Sphere saturated;
-    uint16_t level = 0;  ///< by how many halvings of the error it is finer than the coarsest
+    bool closed = false;  ///< as Node::closed: may be culled by its cone, drawn one-sided
+    NormalCone cone;      ///< of its triangles' normals, if it is closed
+    uint16_t level = 0;   ///< by how many halvings of the error it is finer than the coarsest
 };
 
 struct LiveTask {

@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "base/progress.h"
 #include "base/text.h"
+#include "runtime/eye_side.h"
 #include "runtime/patch_reader.h"
 
 namespace pietra {
@@ -57,16 +58,27 @@ double settle(const ModelReader& reader, LiveModel& model, const View& view, dou
     }
 }
 
-void listChunks(std::span<const LiveChunk> chunks, uint32_t model, const View& view,
-                const Culling& culling, bool show_error, std::vector<DrawPatch>& list) {
+bool eyeMayBeInside(const LiveModel& model, const View& view) {
+    Box3i closed;
+    for (const LiveChunk& chunk : model.chunks())
+        if (chunk.version != 0 && chunk.closed) closed.add(chunk.box);
+    return !closed.empty() && holds({Vec3d(closed.min), Vec3d(closed.max)}, view.eye());
+}
+
+void listChunks(const LiveModel& model, uint32_t number, const View& view, const Culling& culling,
+                bool two_sided, bool show_error, std::vector<DrawPatch>& list) {
     list.clear();
+    const std::span<const LiveChunk> chunks = model.chunks();
     for (uint32_t c = 0; c < chunks.size(); ++c) {
         const LiveChunk& chunk = chunks[c];
+        const bool one_sided = chunk.closed && !two_sided;
         if (chunk.version == 0 || (culling.frustum && view.outside(chunk.bounds))) continue;
+        if (culling.cone && one_sided && view.facesAway(chunk.cone, chunk.bounds)) continue;
         DrawPatch patch;
         patch.mesh = &chunk.mesh;
-        patch.page = {model, c};
-        patch.id = c + model * 0x9e3779b9u;
+        patch.page = {number, c};
+        patch.one_sided = one_sided;
+        patch.id = c + number * 0x9e3779b9u;
         patch.value = show_error ? float(view.errorInPixels(chunk.error, chunk.saturated))
                                  : float(chunk.level);
         list.push_back(patch);

@@ -20,10 +20,13 @@ std::unique_ptr<LiveModel> openLive(const ModelReader& reader, OpenLive open);
 double settle(const ModelReader& reader, LiveModel& model, const View& view, double pixels,
               size_t most_bytes);
 
-/// What is to be drawn of it; valid as long as the chunks are. `model`: its number in the scene.
-/// value: the error in pixels, or the level.
-void listChunks(std::span<const LiveChunk> chunks, uint32_t model, const View& view,
-                const Culling& culling, bool show_error, std::vector<DrawPatch>& list);
+/// Of what is drawn now. Within the box of all closed chunks the eye counts as inside.
+bool eyeMayBeInside(const LiveModel& model, const View& view);
+
+/// What is to be drawn of it; valid as long as the chunks are. `number`: the model's in the scene.
+/// `two_sided`: the eye may be inside of a closed part. value: the error in pixels, or the level.
+void listChunks(const LiveModel& model, uint32_t number, const View& view, const Culling& culling,
+                bool two_sided, bool show_error, std::vector<DrawPatch>& list);
 
 /// Refines the same everywhere, until there are more than about so many triangles or no more
 /// are known. May read some pages.

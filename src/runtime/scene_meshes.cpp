@@ -57,7 +57,8 @@ double SceneMeshes::adapt(uint32_t i, const FrameRequest& request, double pixels
         task.only_look = false;
         (void)adaptNow(task);
     }
-    listChunks(pool_.model(i).chunks(), first_model_ + i, out.view, request.culling,
+    out.two_sided = eyeMayBeInside(pool_.model(i), out.view);
+    listChunks(pool_.model(i), first_model_ + i, out.view, request.culling, out.two_sided,
                request.show_error, out.patches);
     return live.largest_px;
 }

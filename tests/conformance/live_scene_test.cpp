@@ -197,6 +197,51 @@ TEST_P(LiveScene, showsTheSameThoughWhatIsHiddenIsCoarser) {
     }
 }
 
+/// A closed part and one that is not, in one model: only of the former's chunks some are left out,
+/// and only those of which every triangle faces away.
+TEST_P(LiveScene, onlyBacksOfClosedPartsAreLeftOut) {
+    ConformanceMesh both = closedMesh(60);
+    const ConformanceMesh sheet = borderedMesh(60);
+    const uint64_t first = both.vertices.position.size();
+    for (const Vec3d& p : sheet.vertices.position) both.add(50.0 * p + Vec3d(60, 0, 0));
+    for (const auto& t : sheet.triangles)
+        both.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+    buildModel(method(), both, scratch_, "both");
+    const ModelReader reader(scratch_.file("both"));
+    const std::unique_ptr<LiveModel> model = openLive(reader, openLive);
+    size_t of_closed = 0, known = 0, left_out = 0;
+    for (int i = 0; i < 100; i += 9) {
+        Camera camera = flight(i).camera;
+        camera.target = {0, 0, 0};
+        camera.eye *= 200.0;
+        const View view(camera, kSize, reader.info().lattice);
+        (void)settle(reader, *model, view, 0.1, size_t(1) << 30);
+        ASSERT_FALSE(eyeMayBeInside(*model, view));
+        std::vector<DrawPatch> drawn;
+        listChunks(*model, 0, view, {.cone = true}, false, false, drawn);
+        std::set<uint32_t> is_drawn;
+        for (const DrawPatch& patch : drawn) is_drawn.insert(uint32_t(patch.page.page));
+        for (uint32_t c = 0; c < model->chunks().size(); ++c) {
+            const LiveChunk& chunk = model->chunks()[c];
+            for (const Triangle& t : chunk.mesh.triangle) {
+                std::array<Vec3d, 3> corner;
+                for (size_t k = 0; k < 3; ++k) corner[k] = Vec3d(chunk.mesh.position[t[k]]);
+                const bool is_sheet =
+                    reader.info().lattice.toInput(chunk.mesh.position[t[0]]).x > 58;
+                ASSERT_FALSE(is_sheet && chunk.closed);
+                of_closed += !is_sheet;
+                known += chunk.closed;
+                if (is_drawn.contains(c)) continue;
+                ++left_out;
+                const Vec3d normal = glm::cross(corner[1] - corner[0], corner[2] - corner[0]);
+                ASSERT_GE(glm::dot(normal, corner[0] - view.eye()), 0);
+            }
+        }
+    }
+    EXPECT_GT(known, of_closed * 9 / 10);
+    EXPECT_GT(left_out, of_closed / 50);
+}
+
 /// From a budget that holds little more than the coarsest mesh to more than all.
 TEST_P(LiveScene, everyFrameIsOneMeshInAnyBudget) {
     for (const char* name : {"closed", "bordered"}) {

@@ -79,6 +79,7 @@ ActiveMesh::ActiveMesh(const ProgressiveMesh& mesh, const References* references
             setVertexAt(4 * f + k, mesh.base_triangle[f][k]);
             setTwin(4 * f + k, edges.twin[3 * f + k]);
         }
+    for (uint32_t f = 0; f < mesh.base_closed.size(); ++f) face[f].left[3] = mesh.base_closed[f];
     for (const ActiveFace& f : face)
         for (uint32_t k = 0; k < 3; ++k) {
             // An edge is met once in each direction, but at a border.

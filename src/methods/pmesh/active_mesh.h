@@ -30,8 +30,9 @@ namespace pietra::pmesh {
 /// vertex in the next triangle counter-clockwise, or kNoCorner.
 struct alignas(32) ActiveFace {
     std::array<uint32_t, 4> vertex{};
-    std::array<uint32_t, 4> left{};             ///< the fourth is another matter: its chunk
-    uint32_t chunk() const { return left[3]; }  ///< that it is drawn in (draw_chunks.h)
+    std::array<uint32_t, 4> left{};  ///< the fourth is another matter: its chunk
+    /// That it is drawn in (draw_chunks.h). At first 1 for what is closed, and 0.
+    uint32_t chunk() const { return left[3]; }
     bool operator==(const ActiveFace&) const = default;
 };
 

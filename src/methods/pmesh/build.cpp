@@ -82,7 +82,7 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
     progress.beginStage("write", counts.operations / kNodeSlots);
     pages.write(work.writer, progress);
     report.nodes = work.writer.nodeCount();
-    work.writer.finish(info, {}, encodeBase(forest));
+    work.writer.finish(info, {.method_format = kMethodFormat}, encodeBase(forest));
     progress.endStage();
     work.finish(report);
     return report;

@@ -93,6 +93,7 @@ struct Collapses {
     explicit Collapses(TempSpace& space) : store(space) {}
     CollapseStore store;
     Mesh base;
+    std::vector<uint8_t> base_closed;  ///< one a triangle: 1 is surely of a closed component
     std::vector<VertexId> base_vertex;
     std::vector<uint32_t> base_last;  ///< the record each came from last, or kNoOperation
     uint32_t numbers = 0;             ///< of vertices, all are below

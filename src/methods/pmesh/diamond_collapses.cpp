@@ -89,6 +89,7 @@ public:
         mesh_.clear();
         label_.clear();
         bound_.clear();
+        closed_.clear();
         state_.clear();
         ids_.reserve(0);
     }
@@ -108,7 +109,8 @@ private:
     SimplifyOutput simplified_;
     Mesh mesh_;
     std::vector<uint8_t> label_;
-    std::vector<float> bound_;  // one a triangle
+    std::vector<float> bound_;     // one a triangle
+    std::vector<uint8_t> closed_;  // likewise: of a closed component (coarsen/components.h)
     std::vector<VertexState> state_;
     KeyMap ids_;
     std::vector<uint32_t> local_;
@@ -142,6 +144,7 @@ void Collapser::add(const CellMesh& cell, bool is_leaf, uint8_t label) {
         label_.push_back(label);
         // What the lattice took is no part of it.
         bound_.push_back(is_leaf ? 0 : cell.bounds.to_original[t]);
+        closed_.push_back(is_leaf ? cell.closed : cell.bounds.from_original[t] != 0);
     }
 }
 
@@ -221,10 +224,10 @@ void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult&
             cell.edge_class.push_back(mesh.edge_class[t]);
             const float bound = recorder.boundOf(slot[t]);
             result.cells[c].bounds.to_original.push_back(bound);
+            // One number is for both directions (surface_map.h): the other one's place is free.
+            result.cells[c].bounds.from_original.push_back(closed_[slot[t]]);
             result.errors[c] = std::max(result.errors[c], bound);
         }
-        // One number is for both directions (surface_map.h).
-        result.cells[c].bounds.from_original.assign(cell.triangleCount(), 0);
     }
 }
 
@@ -266,8 +269,8 @@ private:
         cell.blob.store->get(cell.blob, worker.scratch);
         worker.add(worker.scratch, cell.blob.store == &input_.store, label);
     }
-    /// Most collapses are of the finest diamonds, whose errors soon matter little: pieces there would
-    /// take a fifth of the time.
+    /// Most collapses are of the finest diamonds, whose errors soon matter little: pieces there
+    /// would take a fifth of the time.
     static SurfaceMap::Effort effortAt(int height) {
         constexpr std::array<SurfaceMap::Effort, 4> kEffort{{{0, 1}, {0, 1}, {4, 0.8f}, {6, 0.6f}}};
         return kEffort[size_t(std::clamp(height - 1, 0, 3))];
@@ -277,6 +280,8 @@ private:
         return record == kNoOperation || record < kLocal ? record : first + (record - kLocal);
     }
 
+    static constexpr uint64_t kTrimEvery = 32;  // diamonds
+
     Construction& work_;
     InputLeaves& input_;
     uint32_t patch_triangles_;
@@ -284,6 +289,7 @@ private:
     TempSpace& space_;
     Progress& progress_;
     Collapses& out_;
+    uint64_t taken_ = 0;  // diamonds
     PerThread<Collapser> workers_;
     std::unordered_map<CellId, Cell> below_, cells_;
     std::unique_ptr<CellStore> store_below_, store_;
@@ -372,6 +378,7 @@ DiamondResult LevelCollapser::runDiamond(const LevelItem& item, int level) {
 
 /// Gives records and vertices their numbers.
 void LevelCollapser::take(DiamondResult& result) {
+    if (++taken_ % kTrimEvery == 0) trimHeap();
     const uint32_t first = out_.store.size();
     CHECK_LT(first + result.record.size(), size_t(kLocal));
     std::vector<uint32_t> number;
@@ -429,6 +436,8 @@ void LevelCollapser::runRoot() {
     worker.run({&nothing, 1}, error, effortAt(result.height), result);
     result.ids = {cells.front()};
     take(result);
+    const std::vector<float>& closed = result.cells[0].bounds.from_original;
+    out_.base_closed.assign(closed.begin(), closed.end());
     out_.base = std::move(result.cells[0].mesh);
     std::vector<float> scalars;
     for (size_t v = 0; v < out_.base.vertexCount(); ++v) {

@@ -14,6 +14,8 @@ namespace {
 /// Triangles of a chunk. Fewer cost more vertices on borders, more mean more to make anew.
 constexpr size_t kMost = 2048, kFew = 128;
 constexpr uint32_t kNone = ~0u;
+/// What rounding may take from the cosine of a cone.
+constexpr float kConeSlack = 1e-5f;
 
 /// Damage may take a vertex anywhere; renderers rely on 21 bits. Rounding alone takes none so far
 /// off the lattice.
@@ -49,6 +51,28 @@ float distance(const Vec3f& a, const Vec3i& b) {
     return glm::length(a - Vec3f(b));
 }
 
+/// Around the mean direction; wide open where that is no direction of all.
+NormalCone coneOf(const Mesh& mesh) {
+    thread_local std::vector<Vec3f> normal;
+    normal.clear();
+    Vec3f sum(0);
+    for (const Triangle& t : mesh.triangle) {
+        const Vec3f a(mesh.position[t[0]]);
+        const Vec3f n = glm::cross(Vec3f(mesh.position[t[1]]) - a, Vec3f(mesh.position[t[2]]) - a);
+        const float squared = glm::dot(n, n);
+        if (!(squared > 0)) continue;  // no area, not drawn
+        normal.push_back(n / std::sqrt(squared));
+        sum += normal.back();
+    }
+    NormalCone cone;
+    if (!(glm::dot(sum, sum) > 0)) return cone;
+    cone.axis = glm::normalize(sum);
+    float least = 1;
+    for (const Vec3f& n : normal) least = std::min(least, glm::dot(n, cone.axis));
+    cone.cos_angle = std::max(least - kConeSlack, -1.0f);
+    return cone;
+}
+
 /// Without room for more, and without what it had once.
 template <class T>
 void resizeTight(std::vector<T>& elements, size_t count) {
@@ -79,7 +103,11 @@ size_t DrawChunks::bytes() const {
 
 void DrawChunks::update(ActiveMesh& mesh) {
     std::vector<uint8_t>& touched = mesh.chunk_touched;
-    if (touched.empty()) touched.assign(1, 1);
+    if (touched.empty()) {
+        touched.assign(2, 1);
+        chunk_.resize(2);
+        chunk_[1].closed = true;
+    }
     chunk_.resize(touched.size());
     face_.resize(touched.size());
     if (std::find(touched.begin(), touched.end(), 1) == touched.end()) return;
@@ -161,6 +189,7 @@ uint32_t DrawChunks::cut(ActiveMesh& mesh, uint32_t chunk) {
         other = unused_.back();
         unused_.pop_back();
     }
+    chunk_[other].closed = chunk_[chunk].closed;
     for (const uint32_t f : rest) mesh.face[f].left[3] = other;
     face_[other] = std::move(rest);
     mesh.chunk_touched[other] = 1;
@@ -201,6 +230,7 @@ void DrawChunks::make(const ActiveMesh& mesh, uint32_t index) {
                       layout, chunk.mesh, i);
         box.add(chunk.mesh.position[i]);
     }
+    chunk.box = box;
     const Vec3f centre = 0.5f * (Vec3f(box.min) + Vec3f(box.max));
     uint32_t error = 0;
     chunk.bounds = chunk.saturated = {centre, 0};
@@ -212,6 +242,7 @@ void DrawChunks::make(const ActiveMesh& mesh, uint32_t index) {
         chunk.saturated.radius = std::max(chunk.saturated.radius, away + radius);
         error = std::max<uint32_t>(error, c.split_error);
     }
+    chunk.cone = chunk.closed ? coneOf(chunk.mesh) : NormalCone{};
     chunk.error = float(double(decodeError(error)) * kErrorUnit * double(1 << shift));
     constexpr uint32_t kCodesAnOctave = 8;
     chunk.level = uint16_t((kMaxErrorCode - error) / kCodesAnOctave);

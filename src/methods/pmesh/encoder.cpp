@@ -122,6 +122,7 @@ void Encoder::makeBase() {
     const Mesh& base = collapses_.base;
     forest_.layout = WordLayout::of(base);
     forest_.base_triangle = base.triangle;
+    forest_.base_closed = collapses_.base_closed;
     forest_.base_operation = packing_.base_operation;
     for (uint32_t v = 0; v < base.vertexCount(); ++v) {
         const Vec3i p = base.position[v] >> forest_.lattice.shift;

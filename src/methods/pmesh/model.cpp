@@ -147,13 +147,20 @@ NodeForest openForest(const ModelReader& reader) {
     const auto damaged = [&](const std::string& what) {
         throw InputError(reader.path(), "", "the model is damaged: " + what);
     };
+    const uint32_t format = reader.identity().method_format;
+    if (format > kMethodFormat)
+        throw InputError(reader.path(), "",
+                         fmt::format("version {} of pmesh is unknown, this program reads up to "
+                                     "version {}",
+                                     format, kMethodFormat));
     NodeForest forest;
     forest.lattice = reader.info().lattice;
     forest.layout = WordLayout::of(reader.info().schema);
     forest.row = rowsOf(reader.nodes(), forest.lattice.shift);
     if (reader.pageCount() != forest.row.size()) damaged("a page has several nodes");
     std::string fault;
-    if (!decodeBase(reader.methodSection(), forest, fault)) damaged("its base mesh: " + fault);
+    if (!decodeBase(reader.methodSection(), format, forest, fault))
+        damaged("its base mesh: " + fault);
     return forest;
 }
 

@@ -325,8 +325,12 @@ std::vector<std::byte> encodeBase(const NodeForest& forest) {
         columns.put(4, o == kNoOperation ? 0 : 1 + zigzag(o - next));
         if (o != kNoOperation) next = o + 1;
     }
-    for (const Triangle& t : forest.base_triangle)
-        for (size_t k = 0; k < 3; ++k) columns.put(kBaseCorner + k, t[k]);
+    for (size_t t = 0; t < forest.base_triangle.size(); ++t) {
+        const Triangle& corner = forest.base_triangle[t];
+        const bool closed = !forest.base_closed.empty() && forest.base_closed[t];
+        columns.put(kBaseCorner, corner[0] << 1 | closed);
+        for (size_t k = 1; k < 3; ++k) columns.put(kBaseCorner + k, corner[k]);
+    }
     for (size_t i = 0; i < forest.base_word.size(); ++i)
         columns.put(kBaseWord + i % forest.layout.words(), forest.base_word[i]);
     std::vector<std::byte> bytes;
@@ -335,7 +339,8 @@ std::vector<std::byte> encodeBase(const NodeForest& forest) {
     return bytes;
 }
 
-bool decodeBase(std::span<const std::byte> bytes, NodeForest& forest, std::string& fault) {
+bool decodeBase(std::span<const std::byte> bytes, uint32_t format, NodeForest& forest,
+                std::string& fault) {
     constexpr uint32_t kMost = 1u << 28;
     ByteReader reader(bytes);
     Columns columns;
@@ -350,6 +355,7 @@ bool decodeBase(std::span<const std::byte> bytes, NodeForest& forest, std::strin
     forest.base_vertex.clear();
     forest.base_operation.clear();
     forest.base_triangle.clear();
+    forest.base_closed.clear();
     forest.base_word.clear();
     std::vector<uint32_t> referred(forest.row.size(), 0);
     std::array<uint32_t, 3> position{};
@@ -375,7 +381,11 @@ bool decodeBase(std::span<const std::byte> bytes, NodeForest& forest, std::strin
             forest.base_word.push_back(columns.get(kBaseWord + i));
     }
     for (size_t t = 0; t < triangles; ++t) {
-        const Triangle corners{columns.get(5), columns.get(6), columns.get(7)};
+        Triangle corners{columns.get(5), columns.get(6), columns.get(7)};
+        if (format >= kFormatWithClosed) {
+            forest.base_closed.push_back(corners[0] & 1);
+            corners[0] >>= 1;
+        }
         for (const uint32_t c : corners)
             if (c >= vertices) return fault = fmt::format("vertex {} is not there", c), false;
         forest.base_triangle.push_back(corners);

@@ -28,9 +28,13 @@ std::vector<std::byte> encodeNode(const OperationNode& node);
 /// The base mesh and its vertices' first operations.
 std::vector<std::byte> encodeBase(const NodeForest& forest);
 
-/// Untrusted bytes, as above. forest.row and forest.layout must be set: each operation is in a
-/// root's frontier, each at most once, and its triangles' corners are there. Sets the base only.
-[[nodiscard]] bool decodeBase(std::span<const std::byte> bytes, NodeForest& forest,
+/// Untrusted bytes of such a format, as above. forest.row and forest.layout must be set: each
+/// operation is in a root's frontier, each at most once, and its triangles' corners are there. Sets
+/// the base only.
+[[nodiscard]] bool decodeBase(std::span<const std::byte> bytes, uint32_t format, NodeForest& forest,
                               std::string& fault);
+
+/// ModelIdentity::method_format of files written now, and those from which on something is told.
+inline constexpr uint32_t kMethodFormat = 1, kFormatWithClosed = 1;
 
 }  // namespace pietra::pmesh

@@ -81,7 +81,7 @@ TEST_P(EachForest, SurvivesItsCodec) {
     }
     NodeForest base;
     base.row = forest.row;
-    ASSERT_TRUE(decodeBase(encodeBase(forest), base, fault)) << fault;
+    ASSERT_TRUE(decodeBase(encodeBase(forest), kMethodFormat, base, fault)) << fault;
     EXPECT_EQ(base.base_vertex, forest.base_vertex);
     EXPECT_EQ(base.base_triangle, forest.base_triangle);
     EXPECT_EQ(base.base_operation, forest.base_operation);
@@ -235,7 +235,7 @@ TEST(DamagedNode, IsRefusedOrSound) {
         bytes[random() % bytes.size()] = std::byte(random());
         NodeForest base;
         base.row = forest.row;
-        if (decodeBase(bytes, base, fault)) {
+        if (decodeBase(bytes, kMethodFormat, base, fault)) {
             EXPECT_EQ(base.base_operation.size(), base.base_vertex.size());
         }
     }

@@ -63,8 +63,13 @@ std::vector<NodeRow> rowsOf(std::span<const Node> table, int lattice_shift) {
 }
 
 ProgressiveMesh fromNodes(const NodeForest& forest) {
-    ProgressiveMesh mesh{
-        forest.lattice, forest.base_vertex, forest.base_triangle, forest.base_operation, {}, {}};
+    ProgressiveMesh mesh{forest.lattice,
+                         forest.base_vertex,
+                         forest.base_triangle,
+                         forest.base_closed,
+                         forest.base_operation,
+                         {},
+                         {}};
     mesh.layout = forest.layout;
     mesh.base_word = forest.base_word;
     if (forest.node.empty()) return mesh;

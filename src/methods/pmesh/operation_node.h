@@ -117,6 +117,7 @@ struct NodeForest {
     Lattice lattice;
     std::vector<Vertex> base_vertex;
     std::vector<Triangle> base_triangle;
+    std::vector<uint8_t> base_closed;         ///< as in ProgressiveMesh
     std::vector<OperationId> base_operation;  ///< in slots of roots, or none
     WordLayout layout;
     std::vector<uint32_t> base_word;

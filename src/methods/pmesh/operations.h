@@ -145,6 +145,9 @@ struct ProgressiveMesh {
     Lattice lattice;
     std::vector<Vertex> base_vertex;
     std::vector<Triangle> base_triangle;
+    /// One a base triangle: 1 where the input's component is closed, consistently oriented and not
+    /// inside out. Empty: nothing is known.
+    std::vector<uint8_t> base_closed;
     std::vector<OperationId> base_operation;  ///< the first split of each base vertex, or none
     /// Parents before children; nodes (operation_node.h) have gaps between them, without
     /// operations.

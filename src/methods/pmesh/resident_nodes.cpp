@@ -16,6 +16,7 @@ ResidentNodes::ResidentNodes(NodeForest forest, uint32_t most)
     mesh_.lattice = forest.lattice;
     mesh_.base_vertex = std::move(forest.base_vertex);
     mesh_.base_triangle = std::move(forest.base_triangle);
+    mesh_.base_closed = std::move(forest.base_closed);
     mesh_.base_operation = std::move(forest.base_operation);
     mesh_.layout = forest.layout;
     mesh_.base_word = std::move(forest.base_word);

@@ -161,7 +161,7 @@ private:
             std::max(statistics.resident_bytes, fixed_bytes_ + live->bytes());
         statistics.load_ms += watch.ms();
         std::vector<DrawPatch> list;
-        listChunks(live->chunks(), m, model.view, settings_.culling,
+        listChunks(*live, m, model.view, settings_.culling, eyeMayBeInside(*live, model.view),
                    settings_.shade.show == Show::kError, list);
         for (DrawPatch& patch : list) {
             std::vector<Mesh> mesh{*patch.mesh};
