@@ -59,9 +59,9 @@ int main(int count, char** arguments) {
                     arguments[i], mesh.triangleCount(), piece.cell.size(), piece.strips.size(),
                     seconds, 1e-3 * double(mesh.triangleCount()) / seconds);
         std::printf(
-            "  cells %.2f s, interfaces %.2f s, faces %.2f s, triangles %.2f s, errors %.2f s\n",
+            "  cells %.2f s, interfaces %.2f s, faces and triangles %.2f s, errors %.2f s\n",
             piece.seconds.cells, piece.seconds.interfaces, piece.seconds.faces,
-            piece.seconds.triangles, piece.seconds.errors);
+            piece.seconds.errors);
         for (uint16_t layer = 0; layer <= piece.layers; ++layer) {
             size_t triangles = 0, stars = 0, free_points = 0;
             for (const CellLayers& cell : piece.cell) {

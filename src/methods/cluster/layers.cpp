@@ -1,17 +1,14 @@
 #include "methods/cluster/layers.h"
 
 #include <algorithm>
-#include <cmath>
 #include <unordered_set>
 
 #include "base/check.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
 #include "geometry/lattice.h"
-#include "methods/cluster/anchors.h"
+#include "methods/cluster/layer_step.h"
 #include "methods/cluster/octree_cells.h"
-#include "simplify/deviation.h"
-#include "simplify/deviation_direction.h"
 
 namespace pietra::cluster {
 
@@ -66,59 +63,6 @@ private:
     std::unordered_set<uint64_t> taken_;  // filled when it is first asked for
 };
 
-/// `super_face`: of each face below, its face in the result.
-PolygonMesh nextLayer(const PolygonMesh& below, std::span<const uint8_t> removed,
-                      uint32_t faces_each, const ClusterSettings& settings,
-                      std::vector<uint32_t>& super_face) {
-    const Groups fans = fansWithout(below, removed);
-    std::vector<uint8_t> stays;
-    for (const uint32_t name : below.name) stays.push_back(!removed[name]);
-    const PolygonMesh polygons = mergeFaces(below, fans, stays);
-    const Groups groups = clusterFaces(polygons, below.faceCount() / faces_each, settings);
-    super_face.clear();
-    for (const uint32_t fan : fans.of_face) super_face.push_back(groups.of_face[fan]);
-    return mergeFaces(polygons, groups, findAnchors(polygons, groups));
-}
-
-/// Where to look for what became of each triangle: among those of its super face, by turns.
-std::vector<uint32_t> triangleMap(const LayerTriangles& below, const LayerTriangles& layer,
-                                  std::span<const uint32_t> super_face) {
-    std::vector<uint32_t> first(layer.face.empty() ? 1 : layer.face.back() + 2, 0), next, map;
-    for (const uint32_t f : layer.face) ++first[f + 1];
-    for (size_t f = 1; f < first.size(); ++f) first[f] += first[f - 1];
-    next = first;
-    for (const uint32_t f : below.face) {
-        const uint32_t s = super_face[f];
-        if (next[s] == first[s + 1]) next[s] = first[s];
-        map.push_back(next[s]++);
-    }
-    return map;
-}
-
-/// The bounds of a cell's layer, from those below.
-void boundLayer(CellLayers& cell, std::span<const uint32_t> super_face, FaceBounds& bounds,
-                Deviation& deviation) {
-    const LayerTriangles& layer = cell.layer.back();
-    if (cell.layer.size() == 1) {
-        bounds.to_original.assign(layer.mesh.triangleCount(), 0);
-        bounds.from_original = bounds.to_original;
-        cell.error.push_back(0);
-        return;
-    }
-    const LayerTriangles& below = cell.layer[cell.layer.size() - 2];
-    const std::vector<uint32_t> map = triangleMap(below, layer, super_face);
-    DeviationInput step;
-    step.before = &below.mesh;
-    step.before_bounds = &bounds;
-    step.after = &layer.mesh;
-    step.triangle_map = map;
-    step.child_error = cell.error.back();
-    FaceBounds after;
-    const float error = deviation.run(step, after);
-    bounds = std::move(after);
-    cell.error.push_back(std::max(error, cell.error.back()));
-}
-
 /// Bounds of the strips' distance to layer 0 by what a cell has below the layer at which they
 /// appear: by the first of a strip's cells and by the second.
 void boundStrips(const LayeredPiece& piece, std::span<const Strip> strips, uint32_t cell,
@@ -133,20 +77,9 @@ void boundStrips(const LayeredPiece& piece, std::span<const Strip> strips, uint3
             mesh.position.push_back(piece.position[v]);
         mesh.triangle.push_back({base, base + 1, base + 2});
     }
-    if (own.empty()) return;
-    deviation::Surface source, target;
-    source.assign(mesh);
-    target.assign(piece.cell[cell].layer.back().mesh);
-    std::vector<float> value(own.size(), 0);
-    deviation::Direction direction;
-    deviation::Progressing progress{piece.cell[cell].error.back(), 0};
-    direction.begin(source, target, {}, below.from_original, value, false);
-    for (uint32_t t = 0; t < own.size(); ++t) {
-        const Vec3f origin = source.corner(t, 0);
-        const Vec3f middle = (source.corner(t, 1) - origin + source.corner(t, 2) - origin) / 3.0f;
-        direction.cover(t, target.nearest(origin, middle, {}, {0, HUGE_VALF}).face, progress);
-    }
-    direction.finish(progress);
+    const CellLayers& layers = piece.cell[cell];
+    const std::vector<float> value =
+        cluster::boundStrips(mesh, layers.layer.back().mesh, layers.error.back(), below);
     for (size_t i = 0; i < own.size(); ++i)
         bound[strips[own[i]].cells[0] == cell ? 0 : 1][own[i]] = value[i];
 }
@@ -188,46 +121,53 @@ LayeredPiece buildLayers(const Mesh& mesh, const CellTriangles& cells,
     Interfaces interfaces(mesh, cells);
     const size_t count = cells.of_cell.size();
     std::vector<PolygonMesh> current(count);
-    std::vector<std::vector<uint32_t>> super_face(count);
+    std::vector<LayerStep> step(count);
     std::vector<FaceBounds> bounds(count);
     PerThread<Deviation> deviation;
-    std::span<const Strip> strips;  // those of the layer in work
     std::array<std::vector<float>, 2> strip_bound;
-    parallelFor(count,
-                [&](size_t c) { current[c] = cellMesh(mesh, cells.of_cell[c], interfaces); });
-    spend(piece.seconds.cells);
-    piece.cell.resize(count);
     FreePoints free_points(mesh.position);
-    for (uint16_t layer = 0;; ++layer) {
-        parallelFor(count,
-                    [&](size_t c) { piece.cell[c].layer.push_back(triangulate(current[c])); });
-        for (CellLayers& cell : piece.cell)
-            for (const uint32_t v : cell.layer.back().to_free)
-                cell.layer.back().mesh.position[v] =
-                    free_points.near(cell.layer.back().mesh.position[v]);
-        spend(piece.seconds.triangles);
-        parallelFor(count, [&](size_t c) {
-            boundLayer(piece.cell[c], super_face[c], bounds[c], deviation.local());
-        });
-        addStrips(piece, strips, strip_bound);
-        spend(piece.seconds.errors);
-        if (layer == settings.layers) return piece;
-        interfaces.removeFor(uint16_t(layer + 1), current);
+    piece.cell.resize(count);
+    parallelFor(count, [&](size_t c) {
+        current[c] = cellMesh(mesh, cells.of_cell[c], interfaces);
+        piece.cell[c].layer.push_back(triangulate(current[c]));
+        piece.cell[c].error.push_back(0);
+        bounds[c].to_original.assign(piece.cell[c].layer[0].mesh.triangleCount(), 0);
+        bounds[c].from_original = bounds[c].to_original;
+    });
+    spend(piece.seconds.cells);
+    for (uint16_t layer = 1; layer <= settings.layers; ++layer) {
+        interfaces.removeFor(layer, current);
         const size_t had = piece.strips.size();
         piece.strips = interfaces.strips();
-        strips = std::span(piece.strips).subspan(had);
+        const std::span<const Strip> strips = std::span(piece.strips).subspan(had);
         for (auto& side : strip_bound) side.assign(strips.size(), 0);
         parallelFor(count, [&](size_t c) {
             boundStrips(piece, strips, uint32_t(c), bounds[c], strip_bound);
         });
         spend(piece.seconds.interfaces);
-        const uint32_t faces_each = layer == 0 ? settings.first_faces : settings.faces;
+        const uint32_t faces_each = layer == 1 ? settings.first_faces : settings.faces;
         parallelFor(count, [&](size_t c) {
-            current[c] = nextLayer(current[c], interfaces.justRemoved(), faces_each,
-                                   settings.clustering, super_face[c]);
+            step[c] = nextLayer(current[c], piece.cell[c].layer.back(), interfaces.justRemoved(),
+                                faces_each, settings.clustering);
+            current[c] = std::move(step[c].polygons);
         });
+        for (LayerStep& one : step)
+            for (const uint32_t v : one.triangles.to_free) {
+                Vec3i& p = one.triangles.mesh.position[v];
+                p = free_points.near(p);
+            }
         spend(piece.seconds.faces);
+        parallelFor(count, [&](size_t c) {
+            CellLayers& cell = piece.cell[c];
+            cell.error.push_back(boundLayer(cell.layer.back().mesh, cell.error.back(),
+                                            step[c].triangles.mesh, step[c].triangle_map,
+                                            deviation.local(), bounds[c]));
+            cell.layer.push_back(std::move(step[c].triangles));
+        });
+        addStrips(piece, strips, strip_bound);
+        spend(piece.seconds.errors);
     }
+    return piece;
 }
 
 Mesh mixedMesh(const LayeredPiece& piece, std::span<const uint16_t> layer_of_cell,

@@ -34,7 +34,7 @@ struct LayeredPiece {
     std::vector<Strip> strips;  ///< by layer
     uint16_t layers = 0;        ///< above layer 0
     struct {
-        double cells = 0, interfaces = 0, faces = 0, triangles = 0, errors = 0;
+        double cells = 0, interfaces = 0, faces = 0, errors = 0;
     } seconds;  ///< of the stages
 };
 
