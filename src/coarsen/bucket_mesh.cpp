@@ -20,16 +20,21 @@ struct SortedRecords {
     std::vector<std::pair<CellPath, uint32_t>> order;
 };
 
-SortedRecords sortByPath(std::vector<std::byte> bytes, size_t record_bytes) {
+SortedRecords sortByPath(std::vector<std::byte> bytes, size_t record_bytes, CellShape shape) {
     const size_t count = bytes.size() / record_bytes, corner = record_bytes / 3;
-    std::vector<Vec3i> sums(count);
+    std::vector<CellPath> paths(count);
+    std::vector<Vec3i> sums(shape == CellShape::kCubes ? 0 : count);
     for (size_t t = 0; t < count; ++t) {
         const std::byte* r = bytes.data() + t * record_bytes;
-        sums[t] = latticePoint(VertexRecord::key(r)) + latticePoint(VertexRecord::key(r + corner)) +
-                  latticePoint(VertexRecord::key(r + 2 * corner));
+        const Vec3i a = latticePoint(VertexRecord::key(r)),
+                    b = latticePoint(VertexRecord::key(r + corner)),
+                    c = latticePoint(VertexRecord::key(r + 2 * corner));
+        if (shape == CellShape::kCubes)
+            paths[t] = cubePath(a, b, c);
+        else
+            sums[t] = a + b + c;
     }
-    std::vector<CellPath> paths(count);
-    cellPaths(sums, 3, paths);
+    if (shape == CellShape::kTetrahedra) cellPaths(sums, 3, paths);
     SortedRecords sorted{std::move(bytes), {}};
     sorted.order.resize(count);
     for (size_t t = 0; t < count; ++t) sorted.order[t] = {paths[t], uint32_t(t)};
@@ -67,7 +72,8 @@ private:
     }
 
     void weldOwn() {
-        const SortedRecords sorted = sortByPath(partition_.readOwn(bucket_), 3 * record_.bytes);
+        const SortedRecords sorted =
+            sortByPath(partition_.readOwn(bucket_), 3 * record_.bytes, partition_.shape());
         ids_.reserve(sorted.order.size());
         mesh().triangle.reserve(sorted.order.size());
         paths_.reserve(sorted.order.size());
@@ -114,8 +120,10 @@ private:
         const auto equalSet = [&](const Triangle& a, const Triangle& b) {
             return sortedCorners(a) == sortedCorners(b);
         };
-        // Equal triangles have equal barycentres, hence equal paths: only runs need a look.
+        // Equal triangles have equal paths: only runs need a look.
         size_t kept = 0;
+        std::vector<std::pair<Triangle, size_t>> run;
+        std::vector<size_t> first;
         std::vector<Triangle>& own = mesh().triangle;
         for (size_t begin = 0; begin < own.size();) {
             size_t end = begin + 1;
@@ -124,10 +132,10 @@ private:
                 own[kept] = own[begin];
                 paths_[kept++] = paths_[begin];
             } else {
-                std::vector<std::pair<Triangle, size_t>> run;
+                run.clear();
+                first.clear();
                 for (size_t i = begin; i < end; ++i) run.emplace_back(sortedCorners(own[i]), i);
                 std::sort(run.begin(), run.end());
-                std::vector<size_t> first;
                 for (size_t i = 0; i < run.size(); ++i)
                     if (i == 0 || run[i].first != run[i - 1].first) first.push_back(run[i].second);
                 std::sort(first.begin(), first.end());
@@ -149,7 +157,8 @@ private:
 
     void findLeaves(uint32_t limit, size_t begin, size_t end, int level) {
         if (begin == end) return;
-        if (end - begin > limit && level < kMaxCellLevel) {
+        const bool is_cell = partition_.shape() == CellShape::kTetrahedra || level % 3 == 0;
+        if (!is_cell || (end - begin > limit && level < kMaxCellLevel)) {
             const CellId cell = cellAt(paths_[begin], level);
             const CellPath middle = firstPath(cellChild(cell, 1));
             const size_t split = size_t(std::lower_bound(paths_.begin() + ptrdiff_t(begin),
@@ -172,7 +181,11 @@ private:
         position_.resize(keys_.size());
         for (size_t v = 0; v < keys_.size(); ++v) position_[v] = latticePoint(keys_[v]);
         std::vector<CellPath> paths(keys_.size());
-        cellPaths(position_, 1, paths, level);
+        if (partition_.shape() == CellShape::kCubes)
+            std::transform(position_.begin(), position_.end(), paths.begin(),
+                           [](const Vec3i& p) { return cubePath(p); });
+        else
+            cellPaths(position_, 1, paths, level);
         inside_.resize(keys_.size());
         for (size_t v = 0; v < keys_.size(); ++v)
             inside_[v] = cellAt(paths[v], level) == bucket_.cell;
@@ -204,8 +217,7 @@ private:
     }
 
     size_t homeOf(const Triangle& ghost) {
-        return partition_.bucketOf(position_[ghost[0]] + position_[ghost[1]] + position_[ghost[2]],
-                                   3);
+        return partition_.bucketOf(position_[ghost[0]], position_[ghost[1]], position_[ghost[2]]);
     }
 
     void sendNormals(const std::vector<Vec3l>& sum) {
@@ -476,9 +488,9 @@ void applyMessages(std::span<const Message> messages, BucketMesh& bucket) {
         }
 }
 
-CellPath trianglePath(const Mesh& mesh, size_t triangle) {
+CellPath trianglePath(const Mesh& mesh, size_t triangle, CellShape shape) {
     const Triangle& f = mesh.triangle[triangle];
-    return cellPath(mesh.position[f[0]] + mesh.position[f[1]] + mesh.position[f[2]], 3);
+    return trianglePath(shape, mesh.position[f[0]], mesh.position[f[1]], mesh.position[f[2]]);
 }
 
 }  // namespace pietra

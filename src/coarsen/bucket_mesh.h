@@ -35,7 +35,8 @@ struct Message {
     static constexpr uint64_t kVertex = ~uint64_t(0);
 };
 
-/// A cell that holds at most the leaf maximum of triangles while its parent holds more.
+/// A cell that holds at most the leaf maximum of triangles while its parent holds more; a cube may
+/// hold less.
 struct LeafCell {
     CellId cell;
     uint32_t triangles;
@@ -68,7 +69,6 @@ WeldedBucket weldBucket(const Partition& partition, size_t bucket, const VertexR
 /// Sets normals and edge classes that other buckets know better.
 void applyMessages(std::span<const Message> messages, BucketMesh& bucket);
 
-/// Path of a triangle's barycentre.
-CellPath trianglePath(const Mesh& mesh, size_t triangle);
+CellPath trianglePath(const Mesh& mesh, size_t triangle, CellShape shape = CellShape::kTetrahedra);
 
 }  // namespace pietra

@@ -6,9 +6,14 @@
 // the partition. All predicates are exact in integers; points on a cell's face go to the second
 // child, so each point has exactly one path.
 //
+// Cubes (Wu and Huang 2014, section 5.1) are named likewise, by the octants along the way down: three
+// bits an octree level, the first of which are the root's, so that levels of cells that are cubes are
+// multiples of three; a triangle belongs to the last of the cells of its corners.
+//
 // All cells of one level that share their refinement edge form a diamond; its key is the midpoint
 // of that edge. Pure functions, thread-safe.
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -19,6 +24,8 @@
 
 namespace pietra {
 
+enum class CellShape : uint8_t { kTetrahedra, kCubes };
+
 /// Deepest level of a cell; beyond it, the midpoints of edges would need more than 21 bits.
 inline constexpr int kMaxCellLevel = 57;
 
@@ -26,7 +33,7 @@ inline constexpr int kMaxCellLevel = 57;
 using CellPath = uint64_t;
 
 /// A cell: its path's leading bits behind a one, like an index into a binary heap: roots are 8..13,
-/// the children of c are 2c and 2c+1.
+/// of cubes 8..15, the children of c are 2c and 2c+1.
 using CellId = uint64_t;
 
 inline int cellLevel(CellId cell) {
@@ -64,6 +71,16 @@ CellPath cellPath(const Vec3i& p, int scale, int level = kMaxCellLevel);
 /// Paths of many points p / scale, to `level` rounded up to a multiple of three.
 void cellPaths(std::span<const Vec3i> points, int scale, std::span<CellPath> paths,
                int level = kMaxCellLevel);
+
+/// Of the cubes that hold p, of lattice units each in [0, 2^21). Its lowest bits get lost.
+CellPath cubePath(const Vec3i& p);
+inline CellPath cubePath(const Vec3i& a, const Vec3i& b, const Vec3i& c) {
+    return std::max({cubePath(a), cubePath(b), cubePath(c)});
+}
+/// The path of a triangle in a partition by either.
+inline CellPath trianglePath(CellShape shape, const Vec3i& a, const Vec3i& b, const Vec3i& c) {
+    return shape == CellShape::kCubes ? cubePath(a, b, c) : cellPath(a + b + c, 3);
+}
 
 /// The four corners, in the order that the bisection rule keeps.
 std::array<Vec3i, 4> cellCorners(CellId cell);

@@ -55,6 +55,29 @@ TEST(CellPath, manyAtOnceEqualOneByOne) {
     for (size_t i = 0; i < sums.size(); ++i) EXPECT_EQ(paths[i], cellPath(sums[i], 3)) << i;
 }
 
+/// Octants from the whole cube down; the corner of a cube has the path of the cube.
+TEST(CellPath, cubesHoldTheirPoints) {
+    std::mt19937 random(9);
+    for (int i = 0; i < 2000; ++i) {
+        const Vec3i p = randomPoint(random, (1 << kLatticeBits) - 1);
+        const CellPath path = cubePath(p);
+        for (int level = 0; level <= kMaxCellLevel; level += 3) {
+            const int bits = kLatticeBits - 1 - level / 3;
+            const Vec3i corner = p >> bits << bits, end = corner + ((1 << bits) - 1);
+            EXPECT_EQ(cellAt(cubePath(corner), level), cellAt(path, level));
+            EXPECT_EQ(cellAt(cubePath(end), level), cellAt(path, level));
+            EXPECT_EQ(cellLevel(cellAt(path, level)), level);
+            if (corner.x > 0) {
+                EXPECT_NE(cellAt(cubePath(corner - Vec3i(1, 0, 0)), level), cellAt(path, level));
+            }
+        }
+        const Vec3i q = randomPoint(random, (1 << kLatticeBits) - 1);
+        for (int level = 0; level <= kMaxCellLevel; level += 3)
+            EXPECT_EQ(cellAt(cubePath(p, q, p), level),
+                      std::max(cellAt(path, level), cellAt(cubePath(q), level)));
+    }
+}
+
 TEST(CellPath, refinementEdgeIsTheLongest) {
     std::mt19937 random(3);
     for (int i = 0; i < 500; ++i) {

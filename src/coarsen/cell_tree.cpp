@@ -35,21 +35,19 @@ uint64_t parentOccupancy(uint64_t child, int bit) {
 
 }  // namespace
 
-CellTree::CellTree(std::span<const LeafCell> leaves, uint32_t leaf_triangles) {
+CellTree::CellTree(std::span<const LeafCell> leaves, uint32_t leaf_triangles, CellShape shape) {
     leaf_.reserve(leaves.size() * 2);
     for (const LeafCell& leaf : leaves) leaf_.emplace(leaf.cell, leaf);
     CHECK_EQ(leaf_.size(), leaves.size());
-    mergeSmall(leaf_triangles);
-    for (const auto& [cell, leaf] : leaf_) {
-        deepest_ = std::max(deepest_, cellLevel(cell));
-        for (CellId up = cell; cellLevel(up) > 0;) {
-            up = cellParent(up);
-            if (!is_split_.emplace(up, true).second) break;
-        }
+    if (shape == CellShape::kCubes)
+        mergeCubes(leaf_triangles);
+    else
+        mergeSmall(leaf_triangles);
+    for (const auto& [cell, leaf] : leaf_) deepest_ = std::max(deepest_, cellLevel(cell));
+    if (shape == CellShape::kTetrahedra) {
+        findSplit();
+        close();
     }
-    split_.resize(size_t(deepest_) + 1);
-    for (const auto& [cell, unused] : is_split_) split_[size_t(cellLevel(cell))].push_back(cell);
-    close();
     for (std::vector<CellId>& level : split_) std::sort(level.begin(), level.end());
     leaves_.reserve(leaf_.size());
     for (const auto& [cell, leaf] : leaf_) leaves_.push_back(cell);
@@ -102,6 +100,40 @@ void CellTree::mergeSmall(uint32_t leaf_triangles) {
             leaf_.emplace(parent, LeafCell{parent, uint32_t(total), occupied});
             by_level[size_t(level - 1)].push_back(parent);
         }
+}
+
+/// All eight, as far as they have triangles, where they are leaves.
+void CellTree::mergeCubes(uint32_t leaf_triangles) {
+    std::vector<CellId> level;  // the cells of one level, leaves or not
+    for (int depth = kMaxCellLevel; depth > 0; depth -= 3) {
+        std::unordered_map<CellId, uint64_t> triangles;  // of parents; too many where one is split
+        for (const auto& [cell, leaf] : leaf_)
+            if (cellLevel(cell) == depth) level.push_back(cell);
+        for (const CellId cell : level) {
+            const auto leaf = leaf_.find(cell);
+            triangles[cell >> 3] +=
+                leaf == leaf_.end() ? uint64_t(leaf_triangles) + 1 : leaf->second.triangles;
+        }
+        level.clear();
+        for (const auto& [parent, count] : triangles) {
+            if (count > leaf_triangles) {
+                level.push_back(parent);
+                continue;
+            }
+            for (CellId child = parent << 3; child < (parent + 1) << 3; ++child) leaf_.erase(child);
+            leaf_.emplace(parent, LeafCell{parent, uint32_t(count), 0});
+        }
+    }
+}
+
+void CellTree::findSplit() {
+    for (const auto& [cell, leaf] : leaf_)
+        for (CellId up = cell; cellLevel(up) > 0;) {
+            up = cellParent(up);
+            if (!is_split_.emplace(up, true).second) break;
+        }
+    split_.resize(size_t(deepest_) + 1);
+    for (const auto& [cell, unused] : is_split_) split_[size_t(cellLevel(cell))].push_back(cell);
 }
 
 void CellTree::close() {

@@ -20,7 +20,9 @@ class CellTree {
 public:
     /// `leaves`: disjoint, in any order. Small neighbours are merged into their parent while it
     /// stays within `leaf_triangles`; then diamonds are closed by forced splits.
-    CellTree(std::span<const LeafCell> leaves, uint32_t leaf_triangles);
+    /// Cubes are merged eight at a time, and there are no diamonds to close, nor splitCells().
+    CellTree(std::span<const LeafCell> leaves, uint32_t leaf_triangles,
+             CellShape shape = CellShape::kTetrahedra);
     /// The one that was saved.
     explicit CellTree(StateReader& state);
     void save(StateWriter& state) const;
@@ -35,6 +37,8 @@ public:
 
 private:
     void mergeSmall(uint32_t leaf_triangles);
+    void mergeCubes(uint32_t leaf_triangles);
+    void findSplit();
     void close();
     void closeDiamond(CellId cell);
     void forceSplit(CellId cell);

@@ -40,7 +40,9 @@ InputLeaves::InputLeaves(TriangleSource& source, const InputSettings& settings,
       store(space, int(source.schema().scalars.size()), kStoreName) {
     if (settings.precision.kind == PrecisionSetting::Kind::kAuto)
         vertices.setShift(chooseShift(source, vertices, plan.partition.batch_triangles, progress));
-    Partition partition(source, vertices, plan.partition, space, progress);
+    PartitionSettings partition_settings = plan.partition;
+    partition_settings.shape = settings.shape;
+    Partition partition(source, vertices, partition_settings, space, progress);
     vertices.clear();
     degenerate = partition.degenerateCount();
     if (partition.triangleCount() == 0)
@@ -54,7 +56,8 @@ InputLeaves::InputLeaves(TriangleSource& source, const InputSettings& settings,
     leaf_settings.mark_irregular = settings.mark_irregular;
     const VertexRecord record(source.schema());
     leaves = buildLeaves(partition, record, leaf_settings, space, store, progress);
-    moveCrumbs(leaves, store, std::min(kSmallestPatch, settings.leaf_triangles / 8), progress);
+    if (settings.shape == CellShape::kTetrahedra)
+        moveCrumbs(leaves, store, std::min(kSmallestPatch, settings.leaf_triangles / 8), progress);
 }
 
 InputLeaves::InputLeaves(const AttributeSchema& schema, TempSpace& space, StateReader& state)

@@ -27,6 +27,7 @@ struct InputSettings {
     PrecisionSetting precision;
     uint32_t leaf_triangles = 4000;
     bool mark_irregular = false;  ///< LeafSettings::mark_irregular
+    CellShape shape = CellShape::kTetrahedra;
 };
 
 class InputLeaves {

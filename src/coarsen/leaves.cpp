@@ -105,14 +105,15 @@ private:
 /// ones.
 class LeafCutter {
 public:
-    LeafCutter(const ComponentTable& components, float bound)
-        : components_(components), bound_(bound) {}
+    LeafCutter(const ComponentTable& components, float bound, CellShape shape)
+        : components_(components), bound_(bound), shape_(shape) {}
 
     /// Appends the triangles of `bucket` that lie in the cell.
     void add(const BucketMesh& bucket, CellId cell) {
         const Mesh& mesh = bucket.mesh;
+        const CellPath after = lastPath(cell) + 1;  // 0 where the cell is the last of all
         const size_t begin = findPath(mesh, firstPath(cell)),
-                     end = findPath(mesh, lastPath(cell) + 1);
+                     end = after == 0 ? mesh.triangle.size() : findPath(mesh, after);
         for (size_t t = begin; t < end; ++t) joiner_.addTriangle(mesh, t);
         if (begin < end) out_.closed = out_.closed && allClosed(bucket.components.runs, begin, end);
     }
@@ -139,12 +140,12 @@ private:
         return true;
     }
 
-    static size_t findPath(const Mesh& mesh, CellPath path) {
+    size_t findPath(const Mesh& mesh, CellPath path) const {
         size_t low = 0, high = mesh.triangle.size();
         if (path == 0) return 0;
         while (low < high) {
             const size_t middle = (low + high) / 2;
-            if (trianglePath(mesh, middle) < path)
+            if (trianglePath(mesh, middle, shape_) < path)
                 low = middle + 1;
             else
                 high = middle;
@@ -154,6 +155,7 @@ private:
 
     const ComponentTable& components_;
     float bound_;
+    CellShape shape_;
     MeshJoiner joiner_;
     CellMesh out_;
 };
@@ -186,7 +188,7 @@ Leaves buildLeaves(Partition& partition, const VertexRecord& record, const LeafS
     });
     partition.clear();
     components.resolve();
-    leaves.tree = std::make_unique<CellTree>(cells, settings.leaf_triangles);
+    leaves.tree = std::make_unique<CellTree>(cells, settings.leaf_triangles, partition.shape());
 
     progress.beginStage("cut leaves", leaves.triangles);
     // Tasks: runs of leaves that begin in the same bucket.
@@ -204,7 +206,7 @@ Leaves buildLeaves(Partition& partition, const VertexRecord& record, const LeafS
         else
             runs.back().second = i + 1;
     parallelFor(runs.size(), [&](size_t r) {
-        LeafCutter cutter(components, settings.bound);
+        LeafCutter cutter(components, settings.bound, partition.shape());
         size_t loaded = bucketAt(firstPath(order[runs[r].first]));
         BucketMesh bucket = repository.get(loaded);
         for (size_t i = runs[r].first; i < runs[r].second; ++i) {

@@ -15,10 +15,11 @@ namespace {
 constexpr uint64_t kAimedBucketTriangles = 1 << 16;
 
 /// Level of the buckets: surfaces fill about 6 * 1.6^level cells.
-int bucketLevel(uint64_t triangles) {
+int bucketLevel(uint64_t triangles, CellShape shape) {
     int level = 0;
     for (double cells = 6; cells * double(kAimedBucketTriangles) < double(triangles); cells *= 1.6)
         ++level;
+    if (shape == CellShape::kCubes) level = (level + 2) / 3 * 3;
     return std::min(level, 18);
 }
 
@@ -40,6 +41,8 @@ struct Partition::Dealer {
     /// Routes records [0, count) of `own_bytes_` each: as owner (their barycentre), and as ghosts.
     void deal(std::span<const std::byte> records, bool ghosts_only, size_t record_bytes,
               CellId within);
+
+    static void findCubes(std::span<const Vec3i> points, std::span<CellPath> paths);
 
     void append(size_t bucket, bool ghost, const std::byte* record, size_t bytes) {
         Buffers& b = buffers[bucket];
@@ -85,6 +88,14 @@ struct Partition::Dealer {
     std::vector<Buffers> buffers;
 };
 
+/// Of a triangle, then of its corners.
+void Partition::Dealer::findCubes(std::span<const Vec3i> points, std::span<CellPath> paths) {
+    for (size_t i = 0; i < points.size(); i += 4) {
+        for (size_t k = 1; k < 4; ++k) paths[i + k] = cubePath(points[i + k]);
+        paths[i] = std::max({paths[i + 1], paths[i + 2], paths[i + 3]});
+    }
+}
+
 void Partition::Dealer::deal(std::span<const std::byte> records, bool ghosts_only,
                              size_t record_bytes, CellId within) {
     constexpr size_t kSlice = 4096;
@@ -104,8 +115,10 @@ void Partition::Dealer::deal(std::span<const std::byte> records, bool ghosts_onl
                 key[k] = VertexRecord::key(records.data() + t * record_bytes + k * corner_bytes);
                 p[k + 1] = latticePoint(key[k]);
             }
-            p[0] = p[1] + p[2] + p[3];
-            for (size_t k = 1; k < 4; ++k) p[k] *= 3;
+            if (partition.shape_ == CellShape::kTetrahedra) {
+                p[0] = p[1] + p[2] + p[3];
+                for (size_t k = 1; k < 4; ++k) p[k] *= 3;
+            }
             if (key[0] == key[1] || key[1] == key[2] || key[2] == key[0]) {
                 ++dropped;
                 cells[t] = {};
@@ -113,7 +126,10 @@ void Partition::Dealer::deal(std::span<const std::byte> records, bool ghosts_onl
                 cells[t][0] = 1;
             }
         }
-        cellPaths(points, 3, paths, level);
+        if (partition.shape_ == CellShape::kCubes)
+            findCubes(points, paths);
+        else
+            cellPaths(points, 3, paths, level);
         for (size_t t = begin; t < end; ++t)
             if (cells[t][0] != 0)
                 for (size_t k = 0; k < 4; ++k)
@@ -143,10 +159,11 @@ void Partition::Dealer::deal(std::span<const std::byte> records, bool ghosts_onl
 
 Partition::Partition(TriangleSource& source, const VertexTable& vertices,
                      const PartitionSettings& settings, TempSpace& space, Progress& progress)
-    : own_bytes_(3 * vertices.record().bytes), records_(space) {
+    : shape_(settings.shape), own_bytes_(3 * vertices.record().bytes), records_(space) {
     progress.beginStage("partition", source.triangleCountHint());
     {
-        Dealer dealer(*this, 0, bucketLevel(source.triangleCountHint()), settings.buffer_bytes);
+        Dealer dealer(*this, 0, bucketLevel(source.triangleCountHint(), shape_),
+                      settings.buffer_bytes);
         std::vector<std::array<uint64_t, 3>> index;
         std::vector<std::byte> corners;
         TriangleAhead triangles(source, settings.batch_triangles);
@@ -189,8 +206,8 @@ void Partition::divideOversized(const PartitionSettings& settings, Progress& pro
     std::erase_if(buckets_, [](const Bucket& b) { return b.cell == 0; });
 }
 
-size_t Partition::bucketOf(const Vec3i& p, int scale) const {
-    const CellPath path = cellPath(p, scale);
+size_t Partition::bucketOf(const Vec3i& a, const Vec3i& b, const Vec3i& c) const {
+    const CellPath path = trianglePath(shape_, a, b, c);
     const auto after =
         std::upper_bound(buckets_.begin(), buckets_.end(), path,
                          [](CellPath a, const Bucket& b) { return a < firstPath(b.cell); });

@@ -1,6 +1,7 @@
 #pragma once
 // First half of the partition (Cignoni et al. 2004, section 5.1): one pass over the triangles deals
-// them into buckets, coarse cells of the hierarchy, by the path of their barycentre. A triangle
+// them into buckets, coarse cells of the hierarchy, by the path of their barycentre (of
+// cubes: by the last of their corners'; these buckets are cubes). A triangle
 // with a corner in the cell of another bucket is also sent there as a *ghost*, so that every bucket
 // sees all triangles around the vertices that lie in its cell. Triangles that collapse on the
 // lattice are dropped and counted. Within a bucket triangles keep the order of the input: content
@@ -36,6 +37,7 @@ struct PartitionSettings {
     size_t batch_triangles = 1 << 20;     ///< gathered at a time
     size_t buffer_bytes = 64 << 20;       ///< for all buckets' unwritten records together
     uint64_t bucket_triangles = 1 << 19;  ///< larger buckets are divided again
+    CellShape shape = CellShape::kTetrahedra;
 };
 
 class Partition {
@@ -45,8 +47,9 @@ public:
 
     /// Non-empty buckets in path order; their cells are disjoint and hold every triangle kept.
     const std::vector<Bucket>& buckets() const { return buckets_; }
-    /// Which bucket's cell holds the point p / scale.
-    size_t bucketOf(const Vec3i& p, int scale) const;
+    /// Which bucket has the triangle.
+    size_t bucketOf(const Vec3i& a, const Vec3i& b, const Vec3i& c) const;
+    CellShape shape() const { return shape_; }
     uint64_t triangleCount() const { return triangles_; }
     uint64_t degenerateCount() const { return degenerate_; }
 
@@ -67,6 +70,7 @@ private:
     std::vector<std::byte> readChunks(const std::vector<Chunk>& chunks, uint64_t count,
                                       size_t record_bytes) const;
     void divideOversized(const PartitionSettings& settings, Progress& progress);
+    CellShape shape_;
     size_t own_bytes_;
     Spill records_;
     std::vector<Bucket> buckets_;

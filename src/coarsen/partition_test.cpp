@@ -68,10 +68,14 @@ Truth truthOf(const TestMesh& mesh, const Lattice& lattice) {
 }
 
 TEST_F(PartitionTest, leavesHoldTheWholeTruthWhateverTheBuckets) {
-    for (const bool shuffled : {false, true})
+    for (const auto& [shuffled, shape] : std::initializer_list<std::pair<bool, CellShape>>{
+             {false, CellShape::kTetrahedra},
+             {true, CellShape::kTetrahedra},
+             {false, CellShape::kCubes},
+             {true, CellShape::kCubes}})
         for (const uint64_t bucket : {40, 300, 100000}) {
             const TestMesh mesh = awkwardMesh(40, shuffled);
-            const Built built = build(mesh, bucket, 50, shuffled ? 97 : 1 << 20);
+            const Built built = build(mesh, bucket, 50, shuffled ? 97 : 1 << 20, shape);
             EXPECT_GT(built.buckets, bucket < 1000 ? 10u : 0u);
             const Truth truth = truthOf(mesh, built.lattice);
             EXPECT_EQ(built.degenerate, 1u);
@@ -79,12 +83,13 @@ TEST_F(PartitionTest, leavesHoldTheWholeTruthWhateverTheBuckets) {
             std::set<std::array<uint64_t, 3>> found;
             uint64_t border = 0, many = 0;
             for (const auto& [cell, blob] : built.leaves.blobs) {
+                EXPECT_TRUE(shape == CellShape::kTetrahedra || cellLevel(cell) % 3 == 0);
                 CellMesh leaf;
                 built.store->get(blob, leaf);
                 EXPECT_LE(leaf.mesh.triangleCount(), 50u);
                 for (size_t t = 0; t < leaf.mesh.triangleCount(); ++t) {
-                    EXPECT_TRUE(
-                        cellContains(cell, cellAt(trianglePath(leaf.mesh, t), kMaxCellLevel)));
+                    EXPECT_TRUE(cellContains(
+                        cell, cellAt(trianglePath(leaf.mesh, t, shape), kMaxCellLevel)));
                     std::array<uint64_t, 3> key;
                     for (size_t k = 0; k < 3; ++k)
                         key[k] = latticeKey(leaf.mesh.position[leaf.mesh.triangle[t][k]]);

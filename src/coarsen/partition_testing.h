@@ -35,13 +35,14 @@ public:
         size_t buckets = 0;
     };
     Built build(const TestMesh& mesh, uint64_t bucket_triangles, uint32_t leaf_triangles,
-                size_t batch = 1 << 20) {
+                size_t batch = 1 << 20, CellShape shape = CellShape::kTetrahedra) {
         MemorySource source(mesh.positions, mesh.triangles);
         VertexTable vertices(source, "test", {}, space_, progress_);
         vertices.setShift(chooseShift(source, vertices, batch, progress_));
         PartitionSettings settings;
         settings.bucket_triangles = bucket_triangles;
         settings.batch_triangles = batch;
+        settings.shape = shape;
         Partition partition(source, vertices, settings, space_, progress_);
         Built built;
         built.buckets = partition.buckets().size();

@@ -45,7 +45,8 @@ InputLeaves Construction::readInput(Progress& progress) {
     progress.setStages(InputLeaves::kStages + kind_.stages + 1);
     return InputLeaves(
         source_,
-        {settings_.input_name, settings_.precision, settings_.leaf_triangles, kind_.mark_irregular},
+        {settings_.input_name, settings_.precision, settings_.leaf_triangles, kind_.mark_irregular,
+         kind_.shape},
         plan_, space, progress);
 }
 

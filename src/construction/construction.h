@@ -18,6 +18,7 @@ public:
         const char* name;
         int stages;  ///< of progress, between the leaves and writing
         bool mark_irregular = false;
+        CellShape shape = CellShape::kTetrahedra;
     };
     /// Reads the input, or takes up what an interrupted build left of it. All must outlive this.
     /// Throws what a build throws.
