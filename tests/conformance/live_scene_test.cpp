@@ -253,7 +253,7 @@ TEST_P(LiveScene, everyFrameIsOneMeshInAnyBudget) {
             topologyOf(welded(first.converge(flight(0)).models[0].patches));
         std::set<double> settled;
         for (const size_t more :
-             {size_t(60'000), size_t(500'000), size_t(2) << 20, size_t(64) << 20}) {
+             {size_t(60'000), size_t(400'000), size_t(2) << 20, size_t(64) << 20}) {
             SceneSettings settings = ample();
             settings.ram_bytes = least + more;
             settings.adapt_ms = 0.5;

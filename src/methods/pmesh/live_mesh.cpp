@@ -100,7 +100,7 @@ private:
     }
     /// Of a vertex, in chunks, of which some have it, too.
     size_t wordBytes() const { return 6 * nodes_.mesh().layout.words(); }
-    size_t roomFor(size_t bytes) const;
+    size_t roomFor(size_t bytes);
     uint64_t drawable(uint64_t triangles) const;
     void describe(const LiveTask& task, const PassCounts& counts, bool drawn_limits);
     void giveBack();
@@ -125,13 +125,18 @@ bool LiveMesh::arrive(uint32_t page, const LivePage* decoded) {
     return false;
 }
 
-/// How many vertices memory has room for.
-size_t LiveMesh::roomFor(size_t bytes) const {
-    const size_t vertices = adaption_.mesh().vertexCount();
-    const size_t chunks = chunks_.bytes();
-    const size_t others = nodes_.bytes() + base_bytes_ + chunks -
-                          std::min(chunks, vertices * (kChunkBytes + wordBytes()));
-    return (bytes - std::min(bytes, others)) / (kVertexBytes + wordBytes());
+/// How many vertices memory has room for. What vertices that have left still hold beyond that has
+/// no place beside these: it goes back first.
+size_t LiveMesh::roomFor(size_t bytes) {
+    const auto room = [&] {
+        const size_t vertices = adaption_.mesh().vertexCount();
+        const size_t chunks = chunks_.bytes();
+        const size_t others = nodes_.bytes() + base_bytes_ + chunks -
+                              std::min(chunks, vertices * (kChunkBytes + wordBytes()));
+        return (bytes - std::min(bytes, others)) / (kVertexBytes + wordBytes());
+    };
+    if (most_vertices_ > std::max(room(), adaption_.mesh().vertexCount())) giveBack();
+    return room();
 }
 
 /// A vertex more is two triangles more, at most.
