@@ -1,6 +1,7 @@
 """What the benchmark scripts share: the program, inputs, temporary folders, tables."""
 import gzip
 import json
+import math
 import os
 import pathlib
 import shutil
@@ -62,6 +63,15 @@ def moon(folder, *arguments, name):
 
 def median(values):
     return statistics.median(values)
+
+
+def between(pairs, x):
+    """y at x, both on logarithmic scales, among pairs (x, y); None beyond them."""
+    pairs = sorted(pairs)
+    for (x0, y0), (x1, y1) in zip(pairs, pairs[1:]):
+        if x0 <= x <= x1 and x0 > 0:
+            return y0 * (y1 / y0)**(math.log(x / x0) / math.log(x1 / x0) if x1 > x0 else 0)
+    return None
 
 
 def table(header, rows):

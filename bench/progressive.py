@@ -9,7 +9,6 @@ held more than --ram. Names of meshes are those of construction.py, or files."""
 import argparse
 import csv
 import json
-import math
 import os
 import pathlib
 
@@ -128,12 +127,8 @@ def at_equal_errors(name, models, options):
     found = {"tetra": at("tetra", flying.TOLERANCES),
              "pmesh": at("pmesh", (0.125, 0.25, *flying.TOLERANCES))}
     for error, triangles in found["tetra"]:
-        between = [pair for pair in zip(found["pmesh"], found["pmesh"][1:])
-                   if pair[0][0] <= error <= pair[1][0]]
-        if between:
-            (e0, t0), (e1, t1) = between[0]
-            share = math.log(error / e0) / math.log(e1 / e0)
-            own = t0 * (t1 / t0)**share
+        own = common.between(found["pmesh"], error)
+        if own:
             yield [name, f"{error:.3f}", f"{triangles:,.0f}", f"{own:,.0f}", f"{own / triangles:.2f}"]
 
 
