@@ -43,26 +43,28 @@ def row(model, path, kind, s, options):
             f"{s['bytes_read'] / 2**20:.1f}", f"{over / 2**20:+.0f}"]
 
 
-def orbit_of(model, options):
-    """The orbit's keys, as a flight of a few frames reports them."""
-    report = common.report("bench", model, "--path", "orbit", "--size", options.size, "--frames", 2,
+def keys_of(model, path, options):
+    """A standard path's keys, as a flight of a few frames reports them."""
+    report = common.report("bench", model, "--path", path, "--size", options.size, "--frames", 2,
                            "--renderer", "none", "--up", options.up, folder=options.folder)
     return report["path"]["keys"]
 
 
-def measure(model, options, tolerances=TOLERANCES):
-    """By tolerance: triangles, measured depth error and largest error; medians over frames of the
-    orbit, of the last the largest."""
-    keys = orbit_of(model, options)
+def measure(model, options, tolerances=TOLERANCES, truth=None, path="orbit"):
+    """By tolerance: triangles, measured depth error and largest error; medians over frames of a
+    path, of the last the largest. Against all triangles of `truth`, a model of the same mesh; of
+    this one, if None."""
+    truth = truth or model
+    keys = keys_of(truth, path, options)
     with tempfile.TemporaryDirectory() as folder:
         found = {t: [] for t in tolerances}
         for key in keys[5::max(len(keys) // options.views, 1)]:
             camera = pathlib.Path(folder, "camera.json")
             camera.write_text(json.dumps({k: v for k, v in key.items() if k != "t"}))
-            shot = lambda name, t: common.report(
-                "render", model, "-o", f"{folder}/{name}.png", "--camera", camera, "--size",
+            shot = lambda name, t, of=model: common.report(
+                "render", of, "-o", f"{folder}/{name}.png", "--camera", camera, "--size",
                 options.size, "--pixels", t, folder=folder)
-            shot("full", 0)
+            shot("full", 0, truth)
             for t in tolerances:
                 triangles = shot("cut", t)["triangles"]
                 difference = json.loads(common.pietra("compare", f"{folder}/cut.png",

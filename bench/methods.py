@@ -22,9 +22,9 @@ METHODS = ("tetra", "pmesh")
 class Model:
     """One mesh by one method: built, and its pictures measured."""
 
-    def __init__(self, mesh, method, options):
+    def __init__(self, mesh, method, truth, options):
         self.path, self.made = progressive.build(mesh, method, options)
-        measured = flying.measure(self.path, options, TOLERANCES)
+        measured = flying.measure(self.path, options, TOLERANCES, truth)
         self.measured = {t: (triangles, error) for t, (triangles, error, _) in measured.items()}
 
     def tolerance_for(self, error):
@@ -103,7 +103,8 @@ def main():
             print(f"{name}: the shared data is absent, left out")
             continue
         name = pathlib.Path(name).stem
-        models = {method: Model(mesh, method, options) for method in options.methods.split(",")}
+        truth, _ = progressive.build(mesh, "tetra", options)
+        models = {m: Model(mesh, m, truth, options) for m in options.methods.split(",")}
         all_models[name] = models
         built += [construction_row(name, method, model.made) for method, model in models.items()]
         error = common.between(((t, e) for t, (_, e) in models["tetra"].measured.items()), options.pixels)
