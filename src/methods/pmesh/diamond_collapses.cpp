@@ -269,11 +269,11 @@ private:
         cell.blob.store->get(cell.blob, worker.scratch);
         worker.add(worker.scratch, cell.blob.store == &input_.store, label);
     }
-    /// Most collapses are of the finest diamonds, whose errors soon matter little: pieces there
-    /// would take a fifth of the time.
+    /// Most collapses are of the finest diamonds, so there pieces are dear; what is lost there
+    /// stays, but matters less the coarser it gets.
     static SurfaceMap::Effort effortAt(int height) {
-        constexpr std::array<SurfaceMap::Effort, 4> kEffort{{{0, 1}, {0, 1}, {4, 0.8f}, {6, 0.6f}}};
-        return kEffort[size_t(std::clamp(height - 1, 0, 3))];
+        if (height > 5) return {12, 0.3f};
+        return height > 3 ? SurfaceMap::Effort{8, 0.5f} : SurfaceMap::Effort{4, 0.8f};
     }
     void take(DiamondResult& result);
     static uint32_t globalRecord(uint32_t record, uint32_t first) {
