@@ -95,6 +95,8 @@ private:
 
     void drawScene();
     std::vector<ModelPatches> drawList(const Camera& camera, const Frame& frame) const;
+    bool looksBack() const;
+    void lookBack();
     void findHidden(const Frame& frame);
     void markHidden(std::vector<ModelPatches>& list);
     ShadeSettings shade() const;
@@ -134,6 +136,7 @@ private:
     std::vector<Pick> picks_;
     Stopwatch running_, touched_, last_key_;
     Camera frozen_camera_;
+    std::optional<SeenDepth> seen_;               // of the last picture that is known
     std::vector<uint32_t> hidden_;                // ids of patches that others hide from there
     std::vector<std::vector<DrawPatch>> marked_;  // coloured by that
     CameraPath path_;
@@ -455,7 +458,10 @@ void Viewer::adaptToMotion() {
 void Viewer::drawScene() {
     adaptToMotion();
     const PictureSize size = screen_->size();
-    if (!state_.frozen) frozen_camera_ = control_.camera();
+    if (!state_.frozen) {
+        frozen_camera_ = control_.camera();
+        lookBack();
+    }
     FrameRequest request;
     request.camera = frozen_camera_;
     request.size = size;
@@ -463,6 +469,7 @@ void Viewer::drawScene() {
     request.seconds = running_.seconds();
     request.prefetch = state_.prefetch;
     request.show_error = state_.show == Show::kError;
+    request.seen = seen_ ? &*seen_ : nullptr;
     const Frame& frame = scene_ ? scene_->update(request) : nothing_;
     shown_ = &frame;
     const Stopwatch watch;
@@ -470,7 +477,8 @@ void Viewer::drawScene() {
     if (show_hidden) findHidden(frame);
     std::vector<ModelPatches> list = drawList(control_.camera(), frame);
     if (show_hidden) markHidden(list);
-    screen_->renderer().draw(list, {shade(), state_.samples, request.culling.occlusion});
+    screen_->renderer().draw(list, {shade(), state_.samples, request.culling.occlusion, nullptr,
+                                    looksBack() ? &frozen_camera_ : nullptr});
     figures_.draw_ms = watch.ms();
     figures_.tolerance_px = frame.tolerance_px;
     figures_.settled = frame.settled && motion_factor_ == 1;
@@ -482,6 +490,16 @@ void Viewer::drawScene() {
     figures_.device_bytes = frame.device_bytes;
     figures_.bytes_read = frame.bytes_read;
     picture_size_ = size;
+}
+
+/// What the last picture hides may be coarser. One model hides little of itself.
+bool Viewer::looksBack() const {
+    return models_.size() > 1 && state_.samples == 1 && !state_.frozen;
+}
+
+void Viewer::lookBack() {
+    const SeenDepth* seen = looksBack() ? screen_->renderer().seen() : nullptr;
+    seen_ = seen != nullptr ? std::optional(*seen) : std::nullopt;
 }
 
 std::vector<ModelPatches> Viewer::drawList(const Camera& camera, const Frame& frame) const {

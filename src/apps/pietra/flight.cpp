@@ -95,10 +95,10 @@ private:
         record.adapt_ms = frame.adapt_ms;
         record.load_ms = frame.publish_ms;
         if (renderer_) {
-            record.draw_ms = draw(frame, patchesOf(frame));
+            record.draw_ms = draw(frame, patchesOf(frame), looks_ ? &request.camera : nullptr);
             record.gpu_ms = renderer_->gpuMs();
         }
-        if (looks_) seen_ = seenDepth(request.camera, request.size, renderer_->picture().depth);
+        if (const SeenDepth* seen = looks_ ? renderer_->seen() : nullptr) seen_ = *seen;
         record.ms = watch.ms();
         record.triangles = frame.triangles;
         record.patches = frame.patch_count;
@@ -125,12 +125,14 @@ private:
 
     const SeenDepth* seenOrNull(const SeenDepth& seen) const { return looks_ ? &seen : nullptr; }
 
-    double draw(const Frame& frame, const Lists& lists) {
+    /// `camera`: as LiveSettings has it.
+    double draw(const Frame& frame, const Lists& lists, const Camera* camera = nullptr) {
         const Stopwatch watch;
         std::vector<ModelPatches> list;
         for (size_t m = 0; m < frame.models.size(); ++m)
             list.push_back({frame.models[m].view, &models_[m]->info().lattice, lists[m]});
-        renderer_->draw(list, {{}, settings_.samples, settings_.culling.occlusion});
+        renderer_->draw(list,
+                        {{}, settings_.samples, settings_.culling.occlusion, nullptr, camera});
         renderer_->wait();
         return watch.ms();
     }
@@ -212,7 +214,7 @@ private:
     std::unique_ptr<LiveRenderer> renderer_;  // null: nothing is drawn
     // Whether what pictures hide is told to the scene. One model hides little of itself (README of
     // pmesh); and pictures of several samples have no one depth.
-    const bool looks_ = models_.size() > 1 && settings_.draw == Draw::kCpu &&
+    const bool looks_ = models_.size() > 1 && settings_.draw != Draw::kNothing &&
                         settings_.culling.occlusion && settings_.samples == 1;
     SeenDepth seen_;  // of the last picture
     SeenDepth asked_;  // of the picture that a frame is compared by

@@ -14,6 +14,7 @@
 #include "render/gl/draw_programs.h"
 #include "render/gl/frame_block.h"
 #include "render/gl/occlusion.h"
+#include "render/gl/seen_depths.h"
 #include "render/gl/page_store.h"
 #include "render/gl/targets.h"
 #include "render/gl/upload_ring.h"
@@ -91,6 +92,7 @@ struct GlRenderer::State {
     GlTexture scalar_colours;
     GlVertexArray vertex_array;
     OcclusionCuller culler;
+    SeenDepths seen;
     /// Times of a picture's begin and end, of two pictures in turn.
     struct Timer {
         GlQuery begin, end;
@@ -472,6 +474,17 @@ void GlRenderer::wait() {
 float GlRenderer::depthAt(int x, int y) {
     state_->finish();
     return state_->targets.depthAt(x, y);
+}
+
+void GlRenderer::lookBack(const Camera& camera) {
+    State& s = *state_;
+    CHECK_EQ(s.samples, 1);
+    s.finish();
+    s.seen.begin(camera, s.targets.size(), s.targets.finishedDepth());
+}
+
+const SeenDepth* GlRenderer::seen() {
+    return state_->seen.latest();
 }
 
 Picture GlRenderer::readPicture() {

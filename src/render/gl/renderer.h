@@ -25,6 +25,7 @@
 
 #include "geometry/lattice.h"
 #include "multires/page_sink.h"
+#include "multires/seen_depth.h"
 #include "multires/view.h"
 #include "render/picture.h"
 #include "render/shading.h"
@@ -81,6 +82,11 @@ public:
     Picture readPicture();
     /// Of a pixel of the picture: its depth as in Picture.
     float depthAt(int x, int y);
+    /// Completes the picture of one sample a pixel and has read, without waiting, what it hides
+    /// (seen_depths.h). `camera`: its view's.
+    void lookBack(const Camera& camera);
+    /// Of the last picture that lookBack() has read, or null. Valid until the next call of either.
+    const SeenDepth* seen();
     /// Completes the picture and copies it to the window's lower left corner.
     void present();
 

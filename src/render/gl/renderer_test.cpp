@@ -530,6 +530,24 @@ TEST_F(GlRendererTest, TellsHowLongTheGpuTook) {
     EXPECT_GT(renderer.statistics().triangles, 0u);
 }
 
+TEST_F(GlRendererTest, TellsWhatPicturesOfAnySizeHide) {
+    Scene scene = variedScene();
+    GlRenderer renderer(scene.size, 1, kVram);
+    EXPECT_EQ(renderer.seen(), nullptr);
+    for (const PictureSize size : {scene.size, PictureSize{321, 255}, PictureSize{7, 3}}) {
+        scene.size = size;
+        renderer.resize(size, 1);
+        const Picture picture = drawOnGpu(renderer, scene, {});
+        renderer.lookBack(scene.camera);
+        renderer.wait();
+        ASSERT_NE(renderer.seen(), nullptr);
+        const SeenDepth expected = seenDepth(scene.camera, size, picture.depth);
+        EXPECT_EQ(renderer.seen()->camera, scene.camera);
+        EXPECT_EQ(renderer.seen()->size, size);
+        EXPECT_EQ(renderer.seen()->farthest, expected.farthest);
+    }
+}
+
 TEST_F(GlRendererTest, FindsFaultWithItsCaller) {
     const Scene scene = variedScene();
     GlRenderer renderer(scene.size, 1, kVram);

@@ -31,6 +31,8 @@ public:
     void read(Picture& picture) const;
     /// Waits for the GPU. Of the finished picture, for a pixel within it.
     float depthAt(int x, int y) const;
+    /// As Picture::depth.
+    GLuint finishedDepth() const { return finished_depth_; }
     /// Copies the finished picture to the window's lower left corner.
     void present() const;
 

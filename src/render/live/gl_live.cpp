@@ -20,6 +20,7 @@ void GlLive::draw(std::span<const ModelPatches> models, const LiveSettings& sett
             renderer_.draw(model.patches);
     }
     renderer_.finish();
+    if (settings.camera != nullptr && settings.samples == 1) renderer_.lookBack(*settings.camera);
 }
 
 }  // namespace pietra

@@ -19,6 +19,7 @@ public:
     void wait() override { renderer_.wait(); }
     const Picture& picture() override { return picture_ = renderer_.readPicture(); }
     float depthAt(int x, int y) override { return renderer_.depthAt(x, y); }
+    const SeenDepth* seen() override { return renderer_.seen(); }
     double gpuMs() const override { return renderer_.statistics().gpu_ms; }
 
     /// Copies the picture to the window's lower left corner.

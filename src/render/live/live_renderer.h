@@ -6,6 +6,7 @@
 #include <span>
 
 #include "multires/page_sink.h"
+#include "multires/seen_depth.h"
 #include "render/picture.h"
 #include "render/raster/rasteriser.h"
 #include "render/shading.h"
@@ -19,6 +20,9 @@ struct LiveSettings {
     bool leave_out_hidden = true;
     /// Takes the ids of those left out, and has draw() wait for them; null: nobody asks.
     std::vector<uint32_t>* hidden = nullptr;
+    /// The picture's camera: seen() shall tell what this picture hides, if it has one sample a
+    /// pixel. Null: nobody asks.
+    const Camera* camera = nullptr;
 };
 
 class LiveRenderer {
@@ -35,6 +39,9 @@ public:
     virtual const Picture& picture() = 0;
     /// Of a pixel of the picture: its depth as in Picture.
     virtual float depthAt(int x, int y) = 0;
+    /// What the last picture of those drawn with a camera hides of which that is known without
+    /// waiting; null before there is one. Valid until the next call of draw() or this.
+    virtual const SeenDepth* seen() = 0;
     /// What the GPU was busy for with a picture lately, by its own clock; 0: not known.
     virtual double gpuMs() const = 0;
 };

@@ -19,10 +19,13 @@ public:
             rasteriser_->restart(first.view, *first.lattice, settings.shade);
         samples_ = settings.samples;
         picture_ = &rasteriser_->drawAll(models, settings.leave_out_hidden, settings.hidden);
+        if (settings.camera != nullptr && samples_ == 1)
+            seen_ = seenDepth(*settings.camera, picture_->size, picture_->depth);
     }
     void wait() override {}
     const Picture& picture() override { return *picture_; }
     float depthAt(int x, int y) override { return picture_->depth[picture_->index(x, y)]; }
+    const SeenDepth* seen() override { return seen_ ? &*seen_ : nullptr; }
     double gpuMs() const override { return 0; }
 
 private:
@@ -30,6 +33,7 @@ private:
     std::optional<Rasteriser> rasteriser_;
     int samples_ = 0;
     const Picture* picture_ = nullptr;
+    std::optional<SeenDepth> seen_;
 };
 
 }  // namespace
