@@ -40,6 +40,15 @@ Mesh readMesh(const char* path) {
     return test::toLattice(shape, (1 << 21) - 4096);
 }
 
+/// Of every cell the coarsest layer whose stated error is at most this, and the strips.
+size_t trianglesAt(const LayeredPiece& piece, float error) {
+    std::vector<uint16_t> choice;
+    for (const CellLayers& cell : piece.cell)
+        choice.push_back(uint16_t(std::upper_bound(cell.error.begin(), cell.error.end(), error) -
+                                  1 - cell.error.begin()));
+    return mixedMesh(piece, choice).triangleCount();
+}
+
 }  // namespace
 
 int main(int count, char** arguments) {
@@ -81,5 +90,9 @@ int main(int count, char** arguments) {
                 layer, triangles, stars, free_points, size_t(strips),
                 double(errors[errors.size() / 2]), double(errors.back()));
         }
+        std::printf("  triangles at stated errors of");
+        for (const float error : {1e3f, 3e3f, 1e4f, 3e4f, 1e5f})
+            std::printf(" %.0f: %zu%s", double(error), trianglesAt(piece, error),
+                        error < 1e5f ? "," : "\n");
     }
 }

@@ -11,6 +11,9 @@ namespace pietra::cluster {
 
 namespace {
 
+/// What turning away counts, beside lying across.
+constexpr float kTurnWeight = 0.25f;
+
 struct Proxy {
     Vec3f centroid, normal;
 };
@@ -23,15 +26,20 @@ Proxy proxyOf(const FaceShape& shape) {
 class Regions {
 public:
     Regions(const PolygonMesh& mesh, uint32_t count, const ClusterSettings& settings)
-        : mesh_(mesh), settings_(settings), corners_(mesh), label_(mesh.faceCount()) {
+        : mesh_(mesh),
+          settings_(settings),
+          corners_(mesh),
+          label_(mesh.faceCount()),
+          missing_(count - std::max(1u, uint32_t(settings.first_share * float(count)))) {
         double area = 0;
         for (const FaceShape& shape : mesh.shape) {
             face_.push_back(proxyOf(shape));
             area += shape.area;
         }
         normal_scale_ = settings.normal_weight * float(area / count);
-        for (uint64_t k = 0; k < count; ++k) {
-            seed_.push_back(uint32_t((2 * k + 1) * mesh.faceCount() / (2 * uint64_t(count))));
+        const uint64_t first = count - missing_;
+        for (uint64_t k = 0; k < first; ++k) {
+            seed_.push_back(uint32_t((2 * k + 1) * mesh.faceCount() / (2 * first)));
             proxy_.push_back(face_[seed_.back()]);
         }
     }
@@ -39,7 +47,9 @@ public:
     Groups run() {
         for (int round = 1; round < settings_.most_rounds; ++round) {
             grow(false);
-            if (!chooseRepresentatives()) break;
+            const bool changed = chooseRepresentatives();
+            if (!changed && missing_ == 0) break;
+            addRepresentatives(missing_ / uint32_t(settings_.most_rounds - round));
         }
         grow(true);
         growRest();
@@ -53,6 +63,15 @@ private:
         const float across = glm::dot(d, p.normal);
         return glm::dot(d, d) + settings_.plane_weight * (across * across) +
                normal_scale_ * (1 - glm::dot(face_[f].normal, p.normal));
+    }
+
+    /// How much a region bends to reach a face: squared, lattice units.
+    float bend(uint32_t f, uint32_t region) const {
+        const Proxy& p = proxy_[region];
+        const Vec3f d = face_[f].centroid - p.centroid;
+        const float across = glm::dot(d, p.normal);
+        return across * across +
+               kTurnWeight * glm::dot(d, d) * (1 - glm::dot(face_[f].normal, p.normal));
     }
 
     /// Waiting faces are known by their half-edge towards the region that may take them. Costs are
@@ -161,6 +180,27 @@ private:
         return changed;
     }
 
+    /// At the faces to which their regions bend most, one a region, in the regions where that is
+    /// most.
+    void addRepresentatives(uint32_t count) {
+        std::vector<std::pair<float, uint32_t>> worst;
+        for (const uint32_t f : seed_) worst.push_back({0.0f, f});
+        for (uint32_t f = 0; f < mesh_.faceCount(); ++f) {
+            const uint32_t k = label_[f];
+            if (k == kNone || f == seed_[k]) continue;
+            const float b = bend(f, k);
+            if (b > worst[k].first) worst[k] = {b, f};
+        }
+        std::sort(worst.begin(), worst.end(), [](const auto& a, const auto& b) {
+            return a.first > b.first || (a.first == b.first && a.second < b.second);
+        });
+        missing_ -= count;
+        for (uint32_t i = 0; i < std::min<size_t>(count, worst.size()) && worst[i].first > 0; ++i) {
+            seed_.push_back(worst[i].second);
+            proxy_.push_back(face_[worst[i].second]);
+        }
+    }
+
     /// Numbers regions by their representatives.
     Groups inOrder() const {
         std::vector<uint32_t> order(seed_.size()), number(seed_.size());
@@ -181,6 +221,7 @@ private:
     std::vector<Proxy> proxy_;       // of each region
     std::vector<uint32_t> outline_;  // of each region: corners
     std::vector<uint32_t> label_;    // of each face: its region
+    uint32_t missing_;               // representatives that are still to come
     float normal_scale_ = 0;
     std::priority_queue<uint64_t, std::vector<uint64_t>, std::greater<>> waiting_;
 };

@@ -11,6 +11,9 @@ namespace pietra::cluster {
 
 namespace {
 
+/// Of the vertices that a cell can do without, it keeps this part, whose leaving would cost most.
+constexpr size_t kKeptPart = 5;
+
 uint64_t pairKey(uint32_t a, uint32_t b) {
     return uint64_t(std::min(a, b)) << 32 | std::max(a, b);
 }
@@ -179,6 +182,13 @@ bool Interfaces::mayBeRemoved(uint32_t v) const {
            !std::binary_search(joined_.begin(), joined_.end(), pairKey(a, b));
 }
 
+/// Squared deviation of the outline.
+double Interfaces::costOf(uint32_t v) const {
+    const Vec3d a(position_[neighbour_[v][0]]), b(position_[neighbour_[v][1]]);
+    const Vec3d across = glm::cross(b - a, Vec3d(position_[v]) - a);
+    return glm::dot(across, across) / glm::dot(b - a, b - a);
+}
+
 /// What both cells can do without, and which of these exclude each other, neighbours apart.
 std::vector<Interfaces::Candidate> Interfaces::candidates(
     std::span<const PolygonMesh> cells, std::vector<std::array<uint32_t, 2>>& conflicts) const {
@@ -187,12 +197,17 @@ std::vector<Interfaces::Candidate> Interfaces::candidates(
     std::vector<uint32_t> voted;
     for (const PolygonMesh& cell : cells) {
         const Corners corners(cell);
+        std::vector<Candidate> own;
         for (uint32_t v = 0; v < cell.vertexCount(); ++v)
-            if (cell.interface_[v] && mayBeRemoved(cell.name[v]) &&
-                fanMayMerge(cell, corners.at(v))) {
-                ++votes[cell.name[v]];
-                voted.push_back(cell.name[v]);
-            }
+            if (const uint32_t name = cell.name[v];
+                cell.interface_[v] && mayBeRemoved(name) && fanMayMerge(cell, corners.at(v)))
+                own.push_back({costOf(name), name});
+        std::sort(own.begin(), own.end());
+        own.resize(own.size() - own.size() / kKeptPart);
+        for (const Candidate& c : own) {
+            ++votes[c.vertex];
+            voted.push_back(c.vertex);
+        }
         // A face may lose several corners: as no two are neighbours, and not both neighbours of one
         // are pinned, three stay. Where faces merge around one, nothing else leaves them.
         for (uint32_t f = 0; f < cell.faceCount(); ++f) {
@@ -209,10 +224,7 @@ std::vector<Interfaces::Candidate> Interfaces::candidates(
     for (const uint32_t v : voted) {
         if (votes[v] != 2) continue;
         votes[v] = 0;
-        const Vec3d a(position_[neighbour_[v][0]]), b(position_[neighbour_[v][1]]);
-        const Vec3d across = glm::cross(b - a, Vec3d(position_[v]) - a);
-        const double length_sq = glm::dot(b - a, b - a);
-        both.push_back({glm::dot(across, across) / length_sq, v});
+        both.push_back({costOf(v), v});
     }
     std::sort(both.begin(), both.end());
     std::sort(conflicts.begin(), conflicts.end());

@@ -3,9 +3,10 @@
 // outline must be the same for both at every layer, and where two layers meet, the gap be closed.
 //
 // From one layer to the next some vertices of interfaces are removed, no two of them in one face of
-// either cell. For each, its two neighbours on the interface become joined, and one triangle, the
-// *strip*, stands between old and new outline: drawn where one cell is finer than that step and the
-// other is not, it closes the gap exactly. Strips of several steps compose.
+// either cell, and of those that a cell can do without not the fifth whose leaving costs most. For
+// each, its two neighbours on the interface become joined, and one triangle, the *strip*, stands
+// between old and new outline: drawn where one cell is finer than that step and the other is not,
+// it closes the gap exactly. Strips of several steps compose.
 //
 // Never removed (pinned) are points where three cells meet, borders of the input, irregular
 // vertices; three of each closed interface; the last vertex between two pinned ones; and any whose
@@ -55,6 +56,7 @@ private:
     void findInterfaces(const Mesh& mesh, std::span<const uint32_t> cell_of);
     void pinLoops();
     bool mayBeRemoved(uint32_t v) const;
+    double costOf(uint32_t v) const;
     std::vector<Candidate> candidates(std::span<const PolygonMesh> cells,
                                       std::vector<std::array<uint32_t, 2>>& conflicts) const;
     void remove(uint32_t v);
