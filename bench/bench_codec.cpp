@@ -14,6 +14,7 @@
 
 #include "base/check.h"
 #include "base/error.h"
+#include "clock.h"
 #include "store/model_reader.h"
 
 namespace pietra {
@@ -21,12 +22,6 @@ namespace {
 
 constexpr int kPasses = 5;
 constexpr uint64_t kMostTriangles = 200000;  // of a band; more only take time
-
-double threadSeconds() {
-    timespec now{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return double(now.tv_sec) + double(now.tv_nsec) * 1e-9;
-}
 
 double medianSeconds(const std::function<void()>& work) {
     std::vector<double> seconds;

@@ -5,11 +5,11 @@
 // patches.
 
 #include <fmt/format.h>
-#include <time.h>
 
 #include <cstdio>
 #include <numeric>
 
+#include "clock.h"
 #include "simplify/deviation_testing.h"
 
 namespace {
@@ -24,13 +24,6 @@ struct Patch {
     std::vector<uint32_t> global;  ///< vertex of the whole
     float child_error = 0;
 };
-
-/// Processor time of this thread: the machine may be shared.
-double threadSeconds() {
-    timespec now;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
-}
 
 /// The whole model at one level.
 struct Level {

@@ -5,14 +5,13 @@
 // Printed for each mesh: the build; refining all of it from its base and coarsening it again; and
 // 300 frames of a camera that flies in from afar and turns, one pass a frame.
 
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 
 #include "base/parallel.h"
+#include "clock.h"
 #include "methods/pmesh/adaption.h"
 #include "methods/pmesh/in_core_builder.h"
 #include "methods/pmesh/node_codec.h"
@@ -23,19 +22,6 @@ namespace {
 
 using namespace pietra;
 using namespace pietra::pmesh;
-
-/// Processor time of all threads: the machine may be shared.
-double now() {
-    timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return double(t.tv_sec) + double(t.tv_nsec) * 1e-9;
-}
-
-double wallNow() {
-    timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return double(t.tv_sec) + double(t.tv_nsec) * 1e-9;
-}
 
 void report(const NodeForest& mesh, const BuildCounts& counts, double seconds) {
     std::printf(
@@ -59,10 +45,10 @@ void report(const NodeForest& mesh, const BuildCounts& counts, double seconds) {
 void reportPages(const NodeForest& forest, const BuildCounts& counts) {
     std::vector<std::vector<std::byte>> pages;
     size_t bytes = encodeBase(forest).size();
-    const double begin = now();
+    const double begin = processSeconds();
     for (const OperationNode& node : forest.node)
         bytes += pages.emplace_back(encodeNode(node)).size();
-    const double encoded = now();
+    const double encoded = processSeconds();
     OperationNode node;
     std::string fault;
     for (NodeIndex n = 0; n < pages.size(); ++n)
@@ -71,14 +57,14 @@ void reportPages(const NodeForest& forest, const BuildCounts& counts) {
     const double rate = 1e-6 * double(counts.operations);
     std::printf("  pages: %.2f bytes an operation; %.2f M operations/s encoded, %.2f decoded\n",
                 double(bytes) / double(counts.operations), rate / (encoded - begin),
-                rate / (now() - encoded));
+                rate / (processSeconds() - encoded));
 }
 
 /// Passes to the end; operations a second.
 void settle(const char* what, Adaption& adaption, const Criterion& criterion) {
-    const double begin = now();
+    const double begin = processSeconds();
     const PassCounts counts = adaption.settle(criterion);
-    const double seconds = now() - begin;
+    const double seconds = processSeconds() - begin;
     std::printf("  %s: %u operations in %u passes, %.1f ms: %.2f M/s; %zu faces\n", what,
                 counts.operations(), counts.passes, seconds * 1e3,
                 counts.operations() / seconds * 1e-6, adaption.mesh().faceCount());
@@ -91,9 +77,9 @@ void fly(Adaption& adaption, const Box3d& box, const Lattice& lattice, int jobs)
     for (int frame = 0; frame < 300; ++frame) {
         const double t = frame / 300.0;
         const Criterion view = viewFrom(box, lattice, 2 * t, 0.4 + 2 * (1 - t) * (1 - t), 1);
-        const double begin = now();
+        const double begin = processSeconds();
         const PassCounts counts = adaption.pass(view);
-        const double seconds = now() - begin;
+        const double seconds = processSeconds() - begin;
         busy_seconds += seconds;
         operations += counts.operations();
         if (counts.operations() * 1000 < adaption.mesh().vertexCount())
@@ -113,9 +99,10 @@ void hover(Adaption& adaption, const Box3d& box, const Lattice& lattice, int job
     adaption.settle(viewFrom(box, lattice, 2, 0.4, 1));
     for (int frame = 0; frame < 100; ++frame) {
         const Criterion view = viewFrom(box, lattice, 2 + 1e-5 * frame, 0.4, 1);
-        const double begin = now();
+        const double begin = processSeconds();
         operations += adaption.pass(view).operations();
-        ns.push_back((now() - begin) * 1e9 * jobs / double(adaption.mesh().vertexCount()));
+        ns.push_back((processSeconds() - begin) * 1e9 * jobs /
+                     double(adaption.mesh().vertexCount()));
     }
     std::sort(ns.begin(), ns.end());
     std::printf(
@@ -132,7 +119,7 @@ void storm(Adaption& adaption, const Box3d& box, const Lattice& lattice, double 
     uint64_t operations = 0, passes = 0, vertices = 0;
     uint32_t least = ~0u;
     const int frames = 24;
-    const double begin = now(), wall = wallNow();
+    const double begin = processSeconds(), wall = wallSeconds();
     for (int frame = 1; frame <= frames; ++frame) {
         const PassCounts counts = adaption.settle(view(frame));
         operations += counts.operations();
@@ -145,8 +132,8 @@ void storm(Adaption& adaption, const Box3d& box, const Lattice& lattice, double 
         " %.2f M operations/s of processor, %.2f M/s\n",
         pixels, static_cast<unsigned long long>(vertices / frames),
         static_cast<unsigned long long>(operations / frames), least, double(passes) / frames,
-        double(operations) / (now() - begin) * 1e-6,
-        double(operations) / (wallNow() - wall) * 1e-6);
+        double(operations) / (processSeconds() - begin) * 1e-6,
+        double(operations) / (wallSeconds() - wall) * 1e-6);
 }
 
 void run(const char* path, int jobs) {
@@ -160,10 +147,10 @@ void run(const char* path, int jobs) {
     Box3d box;
     for (const Vec3i& p : whole.mesh.position) box.add(whole.lattice.toInput(p));
     BuildCounts counts;
-    const double begin = now();
+    const double begin = processSeconds();
     const NodeForest forest = buildInCore(std::move(whole.mesh), whole.lattice, budget, &counts);
     const ProgressiveMesh mesh = fromNodes(forest);
-    report(forest, counts, now() - begin);
+    report(forest, counts, processSeconds() - begin);
     reportPages(forest, counts);
     Adaption adaption(mesh);
     for (int i = 0; i < 2; ++i) {

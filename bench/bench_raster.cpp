@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "clock.h"
 #include "gpu/context.h"
 #include "render/gl/renderer.h"
 #include "render/raster/rasteriser.h"
@@ -65,17 +66,11 @@ struct Cost {
     double wall_ms, cpu_ms;
 };
 
-double now(clockid_t clock) {
-    timespec t{};
-    clock_gettime(clock, &t);
-    return double(t.tv_sec) * 1e3 + double(t.tv_nsec) * 1e-6;
-}
-
 template <class Body>
 Cost costOf(const Body& body) {
-    const double wall = now(CLOCK_MONOTONIC), cpu = now(CLOCK_PROCESS_CPUTIME_ID);
+    const double wall = wallSeconds(), cpu = processSeconds();
     body();
-    return {now(CLOCK_MONOTONIC) - wall, now(CLOCK_PROCESS_CPUTIME_ID) - cpu};
+    return {wallSeconds() - wall, processSeconds() - cpu};
 }
 
 double median(std::vector<double> values) {

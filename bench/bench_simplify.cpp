@@ -9,13 +9,12 @@
 // of the input.
 
 #include <meshoptimizer.h>
-#include <time.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <numeric>
 
+#include "clock.h"
 #include "simplify/simplify.h"
 #include "simplify/test_meshes.h"
 
@@ -28,13 +27,6 @@ struct Piece {
     std::vector<uint8_t> cell;
     std::vector<uint32_t> quota;
 };
-
-/// Of this thread's processor time: the machine may be shared.
-double seconds() {
-    timespec t;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return double(t.tv_sec) + double(t.tv_nsec) * 1e-9;
-}
 
 /// Halves [begin, end) of `order` at the median of the longest axis until small enough.
 void cut(const Mesh& mesh, std::vector<uint32_t>& order, size_t begin, size_t end, size_t limit,
@@ -230,7 +222,7 @@ int main(int argc, char** argv) {
     size_t left = 0, rival_left = 0, collapses = 0;
     for (int round = 0; round < 7; ++round) {
         left = rival_left = collapses = 0;
-        double begin = seconds();
+        double begin = threadSeconds();
         for (const Piece& p : pieces) {
             SimplifyInput in;
             in.mesh = &p.mesh;
@@ -240,13 +232,14 @@ int main(int argc, char** argv) {
             left += out.mesh.triangleCount();
             collapses += out.collapses;
         }
-        ours.push_back(double(mesh.triangleCount()) / (seconds() - begin) * 1e-6);
-        begin = seconds();
+        ours.push_back(double(mesh.triangleCount()) / (threadSeconds() - begin) * 1e-6);
+        begin = threadSeconds();
         for (size_t i = 0; i < pieces.size() && round < 3; ++i) {
             rival.run(i, pieces[i].quota[0], rival_out);
             rival_left += rival_out.size() / 3;
         }
-        if (round < 3) theirs.push_back(double(mesh.triangleCount()) / (seconds() - begin) * 1e-6);
+        if (round < 3)
+            theirs.push_back(double(mesh.triangleCount()) / (threadSeconds() - begin) * 1e-6);
     }
     std::printf("pietra         %.2f M/s (best %.2f), %zu triangles left, %zu collapses\n",
                 median(ours), *std::max_element(ours.begin(), ours.end()), left, collapses);

@@ -9,6 +9,7 @@
 #include "base/check.h"
 #include "base/parallel.h"
 #include "geometry/lattice.h"
+#include "geometry/morton.h"
 
 namespace pietra {
 
@@ -16,20 +17,10 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// Bits of a 21-bit number, two apart.
-uint64_t spreadBits(uint64_t x) {
-    x = (x | x << 32) & 0x1f00000000ffffULL;
-    x = (x | x << 16) & 0x1f0000ff0000ffULL;
-    x = (x | x << 8) & 0x100f00f00f00f00fULL;
-    x = (x | x << 4) & 0x10c30c30c30c30c3ULL;
-    return (x | x << 2) & 0x1249249249249249ULL;
-}
-
-uint64_t mortonCode(const Vec3d& p) {
-    const auto bits = [](double x) {
-        return spreadBits(uint64_t(std::clamp(x, 0.0, double((1 << kLatticeBits) - 1))));
-    };
-    return bits(p.x) | bits(p.y) << 1 | bits(p.z) << 2;
+/// Of a point near the lattice.
+uint64_t codeOf(const Vec3d& p) {
+    constexpr Vec3d kLast((1 << kLatticeBits) - 1);
+    return mortonCode(Vec3i(glm::clamp(p, Vec3d(0), kLast)));
 }
 
 /// Outward by at least the rounding of the conversion; cheaper than the next float.
@@ -107,7 +98,7 @@ SampleIndex::~SampleIndex() = default;
 SampleIndex::SampleIndex(std::vector<Sample> samples, Budget& budget)
     : reservation_(budget.reserve(bytesFor(samples.size()), "the certificate's samples")) {
     std::vector<std::pair<uint64_t, uint32_t>> order(samples.size());
-    for (uint32_t i = 0; i < samples.size(); ++i) order[i] = {mortonCode(samples[i].position), i};
+    for (uint32_t i = 0; i < samples.size(); ++i) order[i] = {codeOf(samples[i].position), i};
     std::sort(order.begin(), order.end(), [&](const auto& a, const auto& b) {
         if (a.first != b.first) return a.first < b.first;
         const auto rank = [](const Sample& s) {

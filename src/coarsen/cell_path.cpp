@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "geometry/morton.h"
 
 namespace pietra {
 
@@ -111,23 +112,8 @@ void cellPaths(std::span<const Vec3i> points, int scale, std::span<CellPath> pat
     }
 }
 
-namespace {
-
-/// Every third bit.
-uint64_t spreadBits(uint32_t x) {
-    uint64_t v = x;
-    v = (v | v << 32) & 0x1f00000000ffffULL;
-    v = (v | v << 16) & 0x1f0000ff0000ffULL;
-    v = (v | v << 8) & 0x100f00f00f00f00fULL;
-    v = (v | v << 4) & 0x10c30c30c30c30c3ULL;
-    return (v | v << 2) & 0x1249249249249249ULL;
-}
-
-}  // namespace
-
 CellPath cubePath(const Vec3i& p) {
-    const uint64_t code = spreadBits(uint32_t(p.x)) << 2 | spreadBits(uint32_t(p.y)) << 1 |
-                          spreadBits(uint32_t(p.z));
+    const uint64_t code = mortonCode({p.z, p.y, p.x});
     constexpr int kLost = 3 * kLatticeBits - (3 + kMaxCellLevel);
     return code >> kLost << (61 - kMaxCellLevel);
 }

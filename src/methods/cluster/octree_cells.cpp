@@ -3,24 +3,11 @@
 #include <algorithm>
 
 #include "geometry/lattice.h"
+#include "geometry/morton.h"
 
 namespace pietra::cluster {
 
 namespace {
-
-/// Every third bit.
-uint64_t spread(uint32_t x) {
-    uint64_t v = x;
-    v = (v | v << 32) & 0x1f00000000ffffULL;
-    v = (v | v << 16) & 0x1f0000ff0000ffULL;
-    v = (v | v << 8) & 0x100f00f00f00f00fULL;
-    v = (v | v << 4) & 0x10c30c30c30c30c3ULL;
-    return (v | v << 2) & 0x1249249249249249ULL;
-}
-
-uint64_t mortonCode(const Vec3i& p) {
-    return spread(uint32_t(p.x)) | spread(uint32_t(p.y)) << 1 | spread(uint32_t(p.z)) << 2;
-}
 
 /// The first codes of the cells, increasing.
 class CellDivision {
