@@ -108,12 +108,13 @@ float Deviation::run(const DeviationInput& in, FaceBounds& bounds) {
     s.findKept(in, bounds);
     Progressing progress{in.child_error, 0};
     s.direction.begin(s.before, s.after, old.to_original, {}, bounds.to_original, true);
-    for (uint32_t t = 0; t < s.before.faceCount(); ++t) {
+    CHECK(in.before_takes <= s.before.faceCount() && in.after_takes <= s.after.faceCount());
+    for (uint32_t t = 0; t < s.before.faceCount() - in.before_takes; ++t) {
         if (!s.kept_old[t]) s.direction.cover(t, s.startForOld(in, t), progress);
     }
     s.direction.finish(progress);
     s.direction.begin(s.after, s.before, {}, old.from_original, bounds.from_original, false);
-    for (uint32_t t = 0; t < s.after.faceCount(); ++t) {
+    for (uint32_t t = 0; t < s.after.faceCount() - in.after_takes; ++t) {
         if (!s.kept_new[t]) s.direction.cover(t, s.startForNew(t), progress);
     }
     s.direction.finish(progress);

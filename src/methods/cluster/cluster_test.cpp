@@ -13,6 +13,7 @@
 #include "methods/cluster/anchors.h"
 #include "methods/cluster/cluster_testing.h"
 #include "methods/cluster/layers.h"
+#include "simplify/deviation_surface.h"
 #include "simplify/test_meshes.h"
 
 namespace pietra::cluster {
@@ -200,6 +201,46 @@ TEST(Cluster, AnyPartitionWillDo) {
             EXPECT_TRUE(cracks.ok()) << input.name << ", " << grain << ": " << cracks.text();
         }
     }
+}
+
+/// Largest distance of points of `from` to `to`.
+double distanceTo(const Mesh& to, const Mesh& from) {
+    deviation::Surface surface;
+    surface.assign(to);
+    double most = 0;
+    for (const Triangle& t : from.triangle)
+        for (const Vec3d& w : {Vec3d(1, 0, 0), Vec3d(0.5, 0.5, 0), Vec3d(1, 1, 1) / 3.0,
+                               Vec3d(0.1, 0.3, 0.6), Vec3d(0.6, 0.1, 0.3)}) {
+            const Vec3d p = w[0] * Vec3d(from.position[t[0]]) + w[1] * Vec3d(from.position[t[1]]) +
+                            w[2] * Vec3d(from.position[t[2]]);
+            const Vec3i origin(glm::floor(p));
+            const float value =
+                surface.nearest(Vec3f(origin), Vec3f(p - Vec3d(origin)), {}, {0, HUGE_VALF}).value;
+            most = std::max(most, double(value));
+        }
+    return most;
+}
+
+/// Whatever is mixed, no point is farther off than the worst cell states; where cells meet in a
+/// plane, that is next to nothing.
+TEST(Cluster, StatedErrorsHold) {
+    for (const Input& input : kInputs) {
+        const Mesh mesh = input.make();
+        const LayeredPiece piece = buildLayers(mesh, smallCells(100));
+        for (uint64_t seed = 0; seed < 4; ++seed) {
+            const std::vector<uint16_t> layers = randomLayers(piece, seed);
+            float stated = 0;
+            for (size_t c = 0; c < layers.size(); ++c)
+                stated = std::max(stated, piece.cell[c].error[layers[c]]);
+            const Mesh mixed = mixedMesh(piece, layers);
+            EXPECT_LE(distanceTo(mixed, mesh), 1.001 * stated + 0.01) << input.name << seed;
+            EXPECT_LE(distanceTo(mesh, mixed), 1.001 * stated + 0.01) << input.name << seed;
+        }
+    }
+    const Mesh plane = test::toLattice(test::gridShape(64, 0), 1 << 16);
+    const LayeredPiece piece = buildLayers(plane, smallCells(600));
+    EXPECT_LE(12, std::count_if(piece.cell.begin(), piece.cell.end(),
+                                [](const CellLayers& cell) { return cell.error[2] < 10; }));
 }
 
 TEST(Cluster, PolygonsKeepTheirInvariants) {

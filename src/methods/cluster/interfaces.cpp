@@ -12,7 +12,7 @@ namespace pietra::cluster {
 namespace {
 
 /// Of the vertices that a cell can do without, it keeps this part, whose leaving would cost most.
-constexpr size_t kKeptPart = 5;
+constexpr size_t kKeptPart = 8;
 
 uint64_t pairKey(uint32_t a, uint32_t b) {
     return uint64_t(std::min(a, b)) << 32 | std::max(a, b);

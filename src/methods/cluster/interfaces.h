@@ -3,7 +3,7 @@
 // outline must be the same for both at every layer, and where two layers meet, the gap be closed.
 //
 // From one layer to the next some vertices of interfaces are removed, no two of them in one face of
-// either cell, and of those that a cell can do without not the fifth whose leaving costs most. For
+// either cell, and of those that a cell can do without not the eighth whose leaving costs most. For
 // each, its two neighbours on the interface become joined, and one triangle, the *strip*, stands
 // between old and new outline: drawn where one cell is finer than that step and the other is not,
 // it closes the gap exactly. Strips of several steps compose.

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
+#include "geometry/lattice.h"
 #include "methods/cluster/anchors.h"
 #include "methods/cluster/interfaces.h"
 #include "simplify/deviation_direction.h"
@@ -26,6 +28,12 @@ std::vector<uint32_t> triangleMap(const LayerTriangles& below, const LayerTriang
     return map;
 }
 
+float largestOf(const FaceBounds& bounds, float least) {
+    for (const float a : bounds.to_original) least = std::max(least, a);
+    for (const float b : bounds.from_original) least = std::max(least, b);
+    return least;
+}
+
 }  // namespace
 
 LayerStep nextLayer(const PolygonMesh& below, const LayerTriangles& below_triangles,
@@ -45,36 +53,94 @@ LayerStep nextLayer(const PolygonMesh& below, const LayerTriangles& below_triang
     return step;
 }
 
+namespace {
+
+/// `mesh` and then the strips, whose corners are vertices of `mesh` where it has their positions.
+Mesh withStrips(const Mesh& mesh, const Mesh& strips) {
+    Mesh whole;
+    whole.position = mesh.position;
+    whole.triangle = mesh.triangle;
+    std::map<uint64_t, uint32_t> vertex;
+    for (const Vec3i& p : strips.position) vertex[latticeKey(p)] = kNone;
+    for (uint32_t v = 0; v < mesh.vertexCount() && !vertex.empty(); ++v)
+        if (const auto at = vertex.find(latticeKey(mesh.position[v])); at != vertex.end())
+            at->second = v;
+    for (Triangle triangle : strips.triangle) {
+        for (uint32_t& corner : triangle) {
+            const Vec3i& p = strips.position[corner];
+            uint32_t& v = vertex[latticeKey(p)];
+            if (v == kNone) {
+                v = uint32_t(whole.position.size());
+                whole.position.push_back(p);
+            }
+            corner = v;
+        }
+        whole.triangle.push_back(triangle);
+    }
+    return whole;
+}
+
+/// Covers `strips` by faces of `target`, looking first where that is nearest.
+void coverStrips(const Mesh& strips, const Mesh& target, std::span<const float> base,
+                 std::span<const float> offset, float error, std::span<float> value,
+                 bool by_target) {
+    deviation::Surface from, to;
+    from.assign(strips);
+    to.assign(target);
+    deviation::Direction direction;
+    deviation::Progressing progress{error, 0};
+    direction.begin(from, to, base, offset, value, by_target);
+    for (uint32_t t = 0; t < from.faceCount(); ++t) {
+        const Vec3f origin = from.corner(t, 0);
+        const Vec3f middle = (from.corner(t, 1) - origin + from.corner(t, 2) - origin) / 3.0f;
+        direction.cover(t, to.nearest(origin, middle, {}, {0, HUGE_VALF}).face, progress);
+    }
+    direction.finish(progress);
+}
+
+}  // namespace
+
 float boundLayer(const Mesh& below, float error, const Mesh& layer,
                  std::span<const uint32_t> triangle_map, Deviation& deviation, FaceBounds& bounds) {
+    std::vector<float> given_bound;
+    return boundLayer(below, error, layer, triangle_map, {}, deviation, bounds, given_bound);
+}
+
+float boundLayer(const Mesh& below, float error, const Mesh& layer,
+                 std::span<const uint32_t> triangle_map, const StripsOfCell& strips,
+                 Deviation& deviation, FaceBounds& bounds, std::vector<float>& given_bound) {
+    const Mesh before = withStrips(below, strips.taken), after = withStrips(layer, strips.given);
+    bounds.to_original.resize(before.triangleCount(), 0);
+    for (const float bound : strips.taken_bound) bounds.from_original.push_back(bound);
     DeviationInput step;
-    step.before = &below;
+    step.before = &before;
     step.before_bounds = &bounds;
-    step.after = &layer;
+    step.after = &after;
     step.triangle_map = triangle_map;
     step.child_error = error;
-    FaceBounds after;
-    const float bound = deviation.run(step, after);
-    bounds = std::move(after);
-    return std::max(bound, error);
+    step.before_takes = uint32_t(strips.taken.triangleCount());
+    step.after_takes = uint32_t(strips.given.triangleCount());
+    FaceBounds result;
+    deviation.run(step, result);
+    const auto first_given = result.to_original.begin() + ptrdiff_t(layer.triangleCount());
+    given_bound.assign(first_given, result.to_original.end());
+    result.to_original.erase(first_given, result.to_original.end());
+    result.from_original.resize(layer.triangleCount());
+    bounds = std::move(result);
+    return largestOf(bounds, error);
+}
+
+float takeStrips(const Mesh& taken, std::span<const float> given_bound, const Mesh& layer,
+                 float error, FaceBounds& bounds) {
+    if (taken.triangle.empty()) return error;
+    coverStrips(taken, layer, given_bound, {}, error, bounds.to_original, true);
+    return largestOf(bounds, error);
 }
 
 std::vector<float> boundStrips(const Mesh& strips, const Mesh& below, float error,
                                const FaceBounds& bounds) {
     std::vector<float> value(strips.triangleCount(), 0);
-    if (value.empty()) return value;
-    deviation::Surface source, target;
-    source.assign(strips);
-    target.assign(below);
-    deviation::Direction direction;
-    deviation::Progressing progress{error, 0};
-    direction.begin(source, target, {}, bounds.from_original, value, false);
-    for (uint32_t t = 0; t < value.size(); ++t) {
-        const Vec3f origin = source.corner(t, 0);
-        const Vec3f middle = (source.corner(t, 1) - origin + source.corner(t, 2) - origin) / 3.0f;
-        direction.cover(t, target.nearest(origin, middle, {}, {0, HUGE_VALF}).face, progress);
-    }
-    direction.finish(progress);
+    if (!value.empty()) coverStrips(strips, below, {}, bounds.from_original, error, value, false);
     return value;
 }
 

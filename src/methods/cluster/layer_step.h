@@ -27,10 +27,30 @@ LayerStep nextLayer(const PolygonMesh& below, const LayerTriangles& below_triang
                     std::span<const uint8_t> removed, uint32_t faces_each,
                     const ClusterSettings& settings);
 
+/// A cell's strips of one step, as meshes of their own. Where a vertex leaves, one of the two cells
+/// loses the strip's triangle and the other gains it, but for folds: it does not matter which is
+/// taken for which as long as it is one of each. What the one *gives* the other *takes*.
+struct StripsOfCell {
+    Mesh given;  ///< as they follow in this cell's outline: before, removed, after
+    Mesh taken;  ///< the other way round
+    /// Of each taken strip: an upper bound of its distance to layer 0.
+    std::vector<float> taken_bound;
+};
+
 /// Of a layer above `below`: an upper bound of its distance to layer 0, both ways, at least
-/// `error`, that of `below`. `bounds`: of the triangles of `below`, then of the layer's.
+/// `error`, that of `below`. `bounds`: of the triangles of `below`, then of the layer's. With
+/// strips, what is near those given is theirs: `given_bound` becomes a bound of its distance from
+/// each. What the cell takes is missing in its bounds until takeStrips().
 float boundLayer(const Mesh& below, float error, const Mesh& layer,
                  std::span<const uint32_t> triangle_map, Deviation& deviation, FaceBounds& bounds);
+float boundLayer(const Mesh& below, float error, const Mesh& layer,
+                 std::span<const uint32_t> triangle_map, const StripsOfCell& strips,
+                 Deviation& deviation, FaceBounds& bounds, std::vector<float>& given_bound);
+
+/// The cell's layer stands from now on for what the other cells gave to the strips that it takes,
+/// `given_bound` of each. Returns the layer's bound, at least `error`, the one before.
+float takeStrips(const Mesh& taken, std::span<const float> given_bound, const Mesh& layer,
+                 float error, FaceBounds& bounds);
 
 /// Upper bounds of the distance to layer 0 of each triangle of `strips`, by what is known of
 /// `below`.

@@ -84,13 +84,40 @@ void boundStrips(const LayeredPiece& piece, std::span<const Strip> strips, uint3
         bound[strips[own[i]].cells[0] == cell ? 0 : 1][own[i]] = value[i];
 }
 
+/// A cell's strips and where they are in the list.
+struct ListedStrips : StripsOfCell {
+    std::vector<size_t> given_at, taken_at;
+};
+
+/// Who is nearer to a strip gives it.
+ListedStrips stripsOf(const LayeredPiece& piece, std::span<const Strip> strips, uint32_t cell,
+                      const std::array<std::vector<float>, 2>& bound) {
+    ListedStrips own;
+    for (size_t i = 0; i < strips.size(); ++i) {
+        const Strip& strip = strips[i];
+        if (strip.cells[0] != cell && strip.cells[1] != cell) continue;
+        const bool first = strip.cells[0] == cell, gives = first == (bound[0][i] < bound[1][i]);
+        Mesh& mesh = gives ? own.given : own.taken;
+        const uint32_t base = uint32_t(mesh.position.size());
+        for (const uint32_t v : {strip.before, strip.removed, strip.after})
+            mesh.position.push_back(piece.position[v]);
+        if (first == gives)
+            mesh.triangle.push_back({base, base + 1, base + 2});
+        else
+            mesh.triangle.push_back({base + 2, base + 1, base});
+        (gives ? own.given_at : own.taken_at).push_back(i);
+        if (!gives) own.taken_bound.push_back(std::min(bound[0][i], bound[1][i]));
+    }
+    return own;
+}
+
 /// For both cells of a strip, the better of its two bounds counts.
 void addStrips(LayeredPiece& piece, std::span<const Strip> strips,
-               const std::array<std::vector<float>, 2>& bound) {
+               const std::array<std::vector<float>, 2>& bound, std::span<const float> given) {
     for (size_t i = 0; i < strips.size(); ++i)
         for (const uint32_t c : strips[i].cells) {
             float& error = piece.cell[c].error.back();
-            error = std::max(error, std::min(bound[0][i], bound[1][i]));
+            error = std::max({error, std::min(bound[0][i], bound[1][i]), given[i]});
         }
 }
 
@@ -157,14 +184,26 @@ LayeredPiece buildLayers(const Mesh& mesh, const CellTriangles& cells,
                 p = free_points.near(p);
             }
         spend(piece.seconds.faces);
+        std::vector<ListedStrips> own(count);
+        std::vector<float> given(strips.size(), 0);
         parallelFor(count, [&](size_t c) {
             CellLayers& cell = piece.cell[c];
+            own[c] = stripsOf(piece, strips, uint32_t(c), strip_bound);
+            std::vector<float> value;
             cell.error.push_back(boundLayer(cell.layer.back().mesh, cell.error.back(),
-                                            step[c].triangles.mesh, step[c].triangle_map,
-                                            deviation.local(), bounds[c]));
+                                            step[c].triangles.mesh, step[c].triangle_map, own[c],
+                                            deviation.local(), bounds[c], value));
+            for (size_t i = 0; i < value.size(); ++i) given[own[c].given_at[i]] = value[i];
             cell.layer.push_back(std::move(step[c].triangles));
         });
-        addStrips(piece, strips, strip_bound);
+        parallelFor(count, [&](size_t c) {
+            std::vector<float> value;
+            for (const size_t i : own[c].taken_at) value.push_back(given[i]);
+            float& error = piece.cell[c].error.back();
+            error =
+                takeStrips(own[c].taken, value, piece.cell[c].layer.back().mesh, error, bounds[c]);
+        });
+        addStrips(piece, strips, strip_bound, given);
         spend(piece.seconds.errors);
     }
     return piece;
