@@ -171,4 +171,26 @@ std::vector<uint8_t> findAnchors(const PolygonMesh& mesh, const Groups& groups) 
     return AnchorFinder(mesh, groups).run();
 }
 
+bool keepFarthest(const PolygonMesh& mesh, const Groups& groups, uint32_t start,
+                  std::vector<uint8_t>& keep) {
+    while (!keep[mesh.corner[start]]) start = nextOnOutline(mesh, groups, start);
+    std::vector<uint32_t> chain;
+    double most = -1;
+    uint32_t best = kNone, h = start;
+    do {
+        chain = {mesh.corner[h]};
+        do {
+            h = nextOnOutline(mesh, groups, h);
+            chain.push_back(mesh.corner[h]);
+        } while (!keep[chain.back()]);
+        for (size_t i = 1; i + 1 < chain.size(); ++i) {
+            const double d = squaredDistance(mesh.position[chain[i]], mesh.position[chain.front()],
+                                             mesh.position[chain.back()]);
+            if (d > most) most = d, best = chain[i];
+        }
+    } while (h != start);
+    if (best != kNone) keep[best] = 1;
+    return best != kNone;
+}
+
 }  // namespace pietra::cluster

@@ -16,4 +16,9 @@ namespace pietra::cluster {
 /// One a vertex: 1 if it stays. The groups are discs with simple outlines.
 std::vector<uint8_t> findAnchors(const PolygonMesh& mesh, const Groups& groups);
 
+/// Of a group's outline, the vertex that lies farthest from the edge for which it was left out
+/// stays, too. `start`: a separating half-edge of the group. False where all stay already.
+bool keepFarthest(const PolygonMesh& mesh, const Groups& groups, uint32_t start,
+                  std::vector<uint8_t>& keep);
+
 }  // namespace pietra::cluster

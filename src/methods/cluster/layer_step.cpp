@@ -13,6 +13,9 @@ namespace pietra::cluster {
 
 namespace {
 
+/// How often polygons that fold over get a vertex back.
+constexpr int kUnfoldingRounds = 2;
+
 /// Where to look for what became of each triangle: among those of its super face, by turns.
 std::vector<uint32_t> triangleMap(const LayerTriangles& below, const LayerTriangles& layer,
                                   std::span<const uint32_t> super_face) {
@@ -45,8 +48,17 @@ LayerStep nextLayer(const PolygonMesh& below, const LayerTriangles& below_triang
     const PolygonMesh polygons = mergeFaces(below, fans, stays);
     const Groups groups = clusterFaces(polygons, below.faceCount() / faces_each, settings);
     LayerStep step;
-    step.polygons = mergeFaces(polygons, groups, findAnchors(polygons, groups));
-    step.triangles = triangulate(step.polygons);
+    std::vector<uint8_t> keep = findAnchors(polygons, groups);
+    const std::vector<uint32_t> starts = outlineStarts(polygons, groups);
+    for (int round = 0;; ++round) {
+        step.polygons = mergeFaces(polygons, groups, keep);
+        step.triangles = triangulate(step.polygons);
+        bool changed = false;
+        if (round < kUnfoldingRounds)
+            for (const uint32_t g : step.triangles.folded)
+                changed |= keepFarthest(polygons, groups, starts[g], keep);
+        if (!changed) break;
+    }
     std::vector<uint32_t> super_face;
     for (const uint32_t fan : fans.of_face) super_face.push_back(groups.of_face[fan]);
     step.triangle_map = triangleMap(below_triangles, step.triangles, super_face);

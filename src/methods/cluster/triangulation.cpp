@@ -47,12 +47,18 @@ struct Corner {
     glm::i64vec2 flat;  // projected along the axis nearest to the normal: exact
 };
 
-int64_t turn(const Corner& a, const Corner& b, const Corner& c) {
-    const glm::i64vec2 u = b.flat - a.flat, v = c.flat - a.flat;
+int64_t turn(const glm::i64vec2& a, const glm::i64vec2& b, const glm::i64vec2& c) {
+    const glm::i64vec2 u = b - a, v = c - a;
     return u.x * v.y - u.y * v.x;
 }
 
+int64_t turn(const Corner& a, const Corner& b, const Corner& c) {
+    return turn(a.flat, b.flat, c.flat);
+}
+
 class Triangulator {
+    static constexpr double kFolded = -2;  // added to the quality, which is between -0.3 and 0.3
+
 public:
     explicit Triangulator(const PolygonMesh& polygons)
         : polygons_(polygons), joined_(polygons.halfEdgeCount()) {
@@ -64,11 +70,14 @@ public:
     LayerTriangles run() {
         for (face_ = 0; face_ < polygons_.faceCount(); ++face_) {
             loadPolygon();
-            if (corner_.size() > 3 && !planEars()) {
+            const bool planned = planEars();
+            folds_ = folds_ || turn(corner_[0], corner_[1], corner_[2]) <= 0;
+            if (!planned || (folds_ && starFits())) {
                 loadPolygon();
                 emitStar();
                 continue;
             }
+            if (folds_) out_.folded.push_back(face_);
             for (const auto& [a, b] : diagonals_) joined_.add(a, b);
             for (const auto& ear : ears_) emit(ear);
             emit({corner_[0], corner_[1], corner_[2]});
@@ -81,18 +90,30 @@ private:
         corner_.clear();
         ears_.clear();
         diagonals_.clear();
+        folds_ = false;
         normal_ = polygons_.shape[face_].normal;
         const double length = glm::length(normal_);
         if (length > 0) normal_ /= length;
         const Vec3d size = glm::abs(normal_);
         const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
-        const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-        const bool turned = normal_[axis] < 0;
-        for (uint32_t h = polygons_.face_begin[face_]; h < polygons_.face_begin[face_ + 1]; ++h) {
-            const Vec3i& p = polygons_.position[polygons_.corner[h]];
+        across_ = {(axis + 1) % 3, (axis + 2) % 3};
+        if (normal_[axis] < 0) std::swap(across_[0], across_[1]);
+        for (uint32_t h = polygons_.face_begin[face_]; h < polygons_.face_begin[face_ + 1]; ++h)
             corner_.push_back({polygons_.corner[h], polygons_.edge_class[h],
-                               turned ? glm::i64vec2(p[v], p[u]) : glm::i64vec2(p[u], p[v])});
-        }
+                               flatOf(polygons_.position[polygons_.corner[h]])});
+    }
+
+    glm::i64vec2 flatOf(const Vec3i& p) const { return {p[across_[0]], p[across_[1]]}; }
+
+    bool starFits() const {
+        const uint32_t m = polygons_.middle[face_];
+        if (m == kNone) return false;
+        const glm::i64vec2 centre = flatOf(polygons_.inner_position[m]);
+        for (uint32_t h = polygons_.face_begin[face_]; h < polygons_.face_begin[face_ + 1]; ++h)
+            if (turn(flatOf(polygons_.position[polygons_.corner[h]]),
+                     flatOf(polygons_.position[polygons_.end(h)]), centre) <= 0)
+                return false;
+        return true;
     }
 
     /// Down to three corners; false where no ear may be cut.
@@ -109,6 +130,7 @@ private:
                 if (best == n || quality > most) best = i, most = quality;
             }
             if (best == n) return false;
+            folds_ |= most < 0.5 * kFolded;
             Corner &a = corner_[(best + n - 1) % n], &c = corner_[(best + 1) % n];
             ears_.push_back({a, corner_[best], c});
             ears_.back()[2].edge_class = EdgeClass::kManifold;
@@ -128,10 +150,11 @@ private:
         const Vec3d pq = q - p, pr = r - p, qr = r - q;
         const double sides = glm::dot(pq, pq) + glm::dot(pr, pr) + glm::dot(qr, qr);
         const double quality = glm::dot(glm::cross(pq, pr), normal_) / sides;
-        if (turn(a, b, c) <= 0) return quality - 4;
+        if (turn(a, b, c) <= 0) return quality + 2 * kFolded;
         for (size_t j = 0; j + 3 < n; ++j) {
             const Corner& d = corner_[(i + 2 + j) % n];
-            if (turn(a, b, d) >= 0 && turn(b, c, d) >= 0 && turn(c, a, d) >= 0) return quality - 2;
+            if (turn(a, b, d) >= 0 && turn(b, c, d) >= 0 && turn(c, a, d) >= 0)
+                return quality + kFolded;
         }
         return quality;
     }
@@ -170,7 +193,9 @@ private:
     LayerTriangles out_;
     uint32_t face_ = 0;
     Vec3d normal_{0};
-    std::vector<Corner> corner_;  // what is left of the face
+    std::array<int, 2> across_{};  // the axes that are left when projected
+    bool folds_ = false;           // some ear does
+    std::vector<Corner> corner_;   // what is left of the face
     std::vector<std::array<Corner, 3>> ears_;
     std::vector<std::pair<uint32_t, uint32_t>> diagonals_;
 };
