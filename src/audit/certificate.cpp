@@ -208,8 +208,7 @@ private:
                 const NodeIndex i = stack.back();
                 stack.pop_back();
                 above[i] = drawn;
-                for (const NodeIndex child : forest_.node(i).child)
-                    if (child != kNoNode) stack.push_back(child);
+                forest_.node(i).forEachChild([&](NodeIndex child) { stack.push_back(child); });
             }
         }
         return above;

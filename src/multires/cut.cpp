@@ -16,11 +16,10 @@ namespace {
 std::vector<NodeIndex> findRoots(std::span<const Node> nodes) {
     std::vector<uint8_t> has_parent(nodes.size(), 0);
     for (const Node& node : nodes)
-        for (const NodeIndex child : node.child) {
-            if (child == kNoNode) continue;
+        node.forEachChild([&](NodeIndex child) {
             CHECK_LT(child, nodes.size());
             has_parent[child] = 1;
-        }
+        });
     std::vector<NodeIndex> roots;
     for (NodeIndex i = 0; i < nodes.size(); ++i)
         if (!has_parent[i]) roots.push_back(i);
@@ -42,8 +41,7 @@ Cut collectCut(std::span<const Node> nodes, Decide&& decide) {
         const Visit visit = decide(i);
         if (visit == Visit::kSkip) continue;
         if (visit == Visit::kRefine && !node.isLeaf()) {
-            for (const NodeIndex child : node.child)
-                if (child != kNoNode) stack.push_back(child);
+            node.forEachChild([&](NodeIndex child) { stack.push_back(child); });
             continue;
         }
         cut.nodes.push_back(i);
@@ -60,11 +58,28 @@ Cut cutWhere(std::span<const Node> nodes, Refine&& refine) {
                       [&](NodeIndex i) { return refine(i) ? Visit::kRefine : Visit::kDraw; });
 }
 
-int64_t trianglesGained(std::span<const Node> nodes, const Node& node) {
-    int64_t gain = -int64_t(node.triangles);
-    for (const NodeIndex child : node.child)
-        if (child != kNoNode) gain += int64_t(nodes[child].triangles);
-    return gain;
+/// What refining groups from the largest error down adds.
+struct Gain {
+    float error;
+    int64_t triangles;
+};
+
+std::vector<Gain> gainsOf(std::span<const Node> nodes) {
+    std::vector<Gain> gains;
+    for (const Node& node : nodes) {
+        if (node.isLeaf() || node.is_joint) continue;
+        Gain gain{node.error, -int64_t(node.triangles)};
+        node.forEachChild([&](NodeIndex i) {
+            const Node& child = nodes[i];
+            if (child.is_joint && child.error >= node.error) return;  // never drawn
+            gain.triangles += int64_t(child.triangles);
+            if (child.is_joint) gains.push_back({child.error, -int64_t(child.triangles)});
+        });
+        gains.push_back(gain);
+    }
+    std::sort(gains.begin(), gains.end(),
+              [](const Gain& a, const Gain& b) { return a.error > b.error; });
+    return gains;
 }
 
 bool refineInView(const Node& node, const View& view, double pixels) {
@@ -157,21 +172,16 @@ Cut cutByError(std::span<const Node> nodes, double max_error) {
 }
 
 Cut cutByTriangles(std::span<const Node> nodes, uint64_t max_triangles) {
-    std::vector<NodeIndex> inner;
-    for (NodeIndex i = 0; i < nodes.size(); ++i)
-        if (!nodes[i].isLeaf()) inner.push_back(i);
-    std::sort(inner.begin(), inner.end(),
-              [&](NodeIndex a, NodeIndex b) { return nodes[a].error > nodes[b].error; });
+    const std::vector<Gain> gains = gainsOf(nodes);
     // Lower the threshold from one stated error to the next; refinement may even lose triangles, so
     // all thresholds are tried.
     Cut cut = rootCut(nodes);
     int64_t triangles = int64_t(cut.triangles);
     bool fits = cut.triangles <= max_triangles;
     double threshold = std::numeric_limits<double>::infinity();
-    for (size_t k = 0; k < inner.size();) {
-        const float error = nodes[inner[k]].error;
-        for (; k < inner.size() && nodes[inner[k]].error == error; ++k)
-            triangles += trianglesGained(nodes, nodes[inner[k]]);
+    for (size_t k = 0; k < gains.size();) {
+        const float error = gains[k].error;
+        for (; k < gains.size() && gains[k].error == error; ++k) triangles += gains[k].triangles;
         if (triangles > int64_t(max_triangles)) continue;
         fits = true;
         // All that state `error` or more are refined, in float exactly.
@@ -237,8 +247,7 @@ std::string validateCut(std::span<const Node> nodes, std::span<const NodeIndex> 
         }
         if (nodes[i].isLeaf()) return fmt::format("nothing is drawn above leaf {}", i);
         refined[i] = 1;
-        for (const NodeIndex child : nodes[i].child)
-            if (child != kNoNode) stack.push_back(child);
+        nodes[i].forEachChild([&](NodeIndex child) { stack.push_back(child); });
     }
     if (met != cut.size()) {
         for (const NodeIndex i : cut)
@@ -246,12 +255,15 @@ std::string validateCut(std::span<const Node> nodes, std::span<const NodeIndex> 
                 if (drawn[p]) return fmt::format("node {} is drawn and so is {} above it", i, p);
     }
     for (uint32_t g = 0; g < forest.groupCount(); ++g) {
-        const std::span<const NodeIndex> members = forest.members(g);
-        for (const NodeIndex i : members)
-            if (refined[i] != refined[members.front()])
+        // A joint below what is drawn says nothing.
+        NodeIndex first = kNoNode;
+        for (const NodeIndex i : forest.members(g)) {
+            if (nodes[i].is_joint && !drawn[i] && !refined[i]) continue;
+            if (first == kNoNode) first = i;
+            if (refined[i] != refined[first])
                 return fmt::format("group {} is refined at node {} but not at node {}",
-                                   nodes[i].group, refined[i] ? i : members.front(),
-                                   refined[i] ? members.front() : i);
+                                   nodes[i].group, refined[i] ? i : first, refined[i] ? first : i);
+        }
     }
     return {};
 }

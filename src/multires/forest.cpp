@@ -37,6 +37,16 @@ void linkChild(std::span<const Node> nodes, NodeIndex i, NodeIndex child, Links&
     }
 }
 
+/// Also true of what is none: children are looked at one by one then.
+bool isRange(std::span<const Node> nodes, NodeIndex i, Links& links) {
+    const Node& node = nodes[i];
+    if (!node.child_range || (node.child[0] <= node.child[1] && node.child[1] < nodes.size()))
+        return true;
+    ++links.bad;
+    noteFault(links.fault, fmt::format("node {}: its range of children does not exist", i));
+    return false;
+}
+
 /// With one parent each at most, whatever cannot be reached from a root is on or below a cycle.
 uint64_t countReachable(std::span<const Node> nodes, const std::vector<NodeIndex>& parent) {
     std::vector<NodeIndex> stack;
@@ -47,8 +57,7 @@ uint64_t countReachable(std::span<const Node> nodes, const std::vector<NodeIndex
         const NodeIndex i = stack.back();
         stack.pop_back();
         ++reached;
-        for (const NodeIndex child : nodes[i].child)
-            if (child != kNoNode) stack.push_back(child);
+        nodes[i].forEachChild([&](NodeIndex child) { stack.push_back(child); });
     }
     return reached;
 }
@@ -57,7 +66,8 @@ Links findLinks(std::span<const Node> nodes) {
     Links links;
     links.parent.assign(nodes.size(), kNoNode);
     for (NodeIndex i = 0; i < nodes.size(); ++i)
-        for (const NodeIndex child : nodes[i].child) linkChild(nodes, i, child, links);
+        if (isRange(nodes, i, links))
+            nodes[i].forEachChild([&](NodeIndex child) { linkChild(nodes, i, child, links); });
     if (links.bad > 0) return links;
     links.bad = nodes.size() - countReachable(nodes, links.parent);
     if (links.bad > 0)
@@ -110,6 +120,12 @@ void checkNode(const Forest& forest, NodeIndex i, ForestReport& report) {
     const NodeIndex p = forest.parent(i);
     if (p == kNoNode) return;
     const Node& parent = forest.node(p);
+    if (node.is_joint) {
+        if (encloses(parent.saturated, node.bounds)) return;
+        ++report.not_nested;
+        noteFault(report.first_fault, fmt::format("node {}: a joint beyond its parent, {}", i, p));
+        return;
+    }
     if (!(node.error <= parent.error)) {
         ++report.not_monotone;
         noteFault(report.first_fault, fmt::format("node {}: error {} exceeds its parent's, {}", i,
@@ -164,8 +180,10 @@ std::vector<uint16_t> Forest::groupHeights() const {
     // Groups are taken once all groups of their children are done, so each link is seen once.
     std::vector<uint32_t> open(groupCount(), 0);
     std::vector<uint16_t> height(groupCount(), 0);
+    // Joints hang below others than their group's.
+    const auto counts = [&](NodeIndex i) { return parent_[i] != kNoNode && !nodes_[i].is_joint; };
     for (NodeIndex i = 0; i < nodes_.size(); ++i)
-        if (parent_[i] != kNoNode) ++open[group_of_[parent_[i]]];
+        if (counts(i)) ++open[group_of_[parent_[i]]];
     std::vector<uint32_t> ready;
     for (uint32_t g = 0; g < groupCount(); ++g)
         if (open[g] == 0) ready.push_back(g);
@@ -173,7 +191,7 @@ std::vector<uint16_t> Forest::groupHeights() const {
         const uint32_t g = ready.back();
         ready.pop_back();
         for (const NodeIndex i : members(g)) {
-            if (parent_[i] == kNoNode) continue;
+            if (!counts(i)) continue;
             const uint32_t above = group_of_[parent_[i]];
             height[above] = std::max<uint16_t>(height[above], uint16_t(height[g] + 1));
             if (--open[above] == 0) ready.push_back(above);
@@ -191,7 +209,8 @@ void Forest::closeUpward(std::vector<uint8_t>& refined) const {
         const uint32_t g = stack.back();
         stack.pop_back();
         for (const NodeIndex i : members(g)) {
-            if (parent_[i] == kNoNode || refined[group_of_[parent_[i]]]) continue;
+            if (parent_[i] == kNoNode || nodes_[i].is_joint || refined[group_of_[parent_[i]]])
+                continue;
             refined[group_of_[parent_[i]]] = 1;
             stack.push_back(group_of_[parent_[i]]);
         }

@@ -56,7 +56,7 @@ bool ForestRefiner::open(uint32_t group, const Sight& sight) {
     bool is_open = residency_.childrenResident(group) || seenChildrenResident(group, sight);
     for (const NodeIndex i : forest_.members(group)) {
         if (!is_open) break;
-        const NodeIndex parent = forest_.parent(i);
+        const NodeIndex parent = forest_.node(i).is_joint ? kNoNode : forest_.parent(i);
         if (parent != kNoNode) is_open = open(forest_.groupOf(parent), sight);
     }
     group_open_[group] = visits_ << 1 | uint32_t(is_open);
@@ -64,12 +64,13 @@ bool ForestRefiner::open(uint32_t group, const Sight& sight) {
 }
 
 bool ForestRefiner::seenChildrenResident(uint32_t group, const Sight& sight) const {
+    bool all = true;
     for (const NodeIndex i : forest_.members(group))
-        for (const NodeIndex child : forest_.node(i).child)
-            if (child != kNoNode && !residency_.resident(forest_.node(child).page) &&
-                sight.shows(forest_.node(child)))
-                return false;
-    return true;
+        forest_.node(i).forEachChild([&](NodeIndex child) {
+            all = all && (residency_.resident(forest_.node(child).page) ||
+                          !sight.shows(forest_.node(child)));
+        });
+    return all;
 }
 
 }  // namespace pietra

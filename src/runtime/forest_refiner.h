@@ -119,11 +119,10 @@ void ForestRefiner::visit(const Sight& sight, Missed missed, const Draw& draw, c
             const bool is_open = refine && !covered && open(forest_.groupOf(i), sight);
             if (!is_open && !covered && sight.shows(node)) draw(i, error);
             if (!refine || (covered && (missed == Missed::kFirst || isLost(i)))) continue;
-            for (const NodeIndex child : node.child)
-                if (child != kNoNode) {
-                    next_level_.push_back({child, !is_open, float(error)});
-                    forest_.prefetch(child);
-                }
+            node.forEachChild([&](NodeIndex child) {
+                next_level_.push_back({child, !is_open, float(error)});
+                forest_.prefetch(child);
+            });
         }
     }
 }

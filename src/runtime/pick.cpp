@@ -54,8 +54,8 @@ double pick(const ModelReader& model, const Ray& ray) {
     using Entry = std::pair<double, NodeIndex>;
     std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
     const auto add = [&](NodeIndex i) {
-        if (i == kNoNode) return;
         const Node& node = model.nodes()[i];
+        if (node.is_joint) return;  // in no finest cut
         const double t = entry(ray, node.isLeaf() ? node.bounds : node.saturated);
         if (t < kNever) open.push({t, i});
     };
@@ -68,7 +68,7 @@ double pick(const ModelReader& model, const Ray& ray) {
         const Node& node = model.nodes()[open.top().second];
         open.pop();
         if (!node.isLeaf()) {
-            for (const NodeIndex child : node.child) add(child);
+            node.forEachChild(add);
             continue;
         }
         if (node.page != page) model.decode(page = node.page, patches);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <unordered_map>
 
 #include "base/error.h"
 #include "base/hash.h"
@@ -74,6 +75,7 @@ ModelReader::ModelReader(const std::string& path) : file_(path, File::Mode::kRea
         levels_[entry.level].count += entry.node_count;
     }
     for (const BlockEntry& entry : directory) readBlock(entry);
+    fillJoints();
     uint64_t triangles = 0;
     for (const Node& node : nodes_) triangles += node.triangles;
     if (triangles != info_.triangles_stored)
@@ -213,6 +215,10 @@ void ModelReader::checkNodes(const BlockEntry& entry) {
             node.level = uint16_t(entry.level);
             triangles += node.triangles;
             vertices += node.vertices;
+            bool sound = !node.is_joint || (node.child[0] == kNoNode && node.child[1] == kNoNode);
+            sound = sound && (!node.child_range ||
+                              (node.child[0] <= node.child[1] && node.child[1] != kNoNode));
+            if (!sound) fail(entry.offset, "a block of nodes is damaged: its children");
             for (const NodeIndex child : node.child)
                 if (child != kNoNode && child - finer.first >= finer.count)
                     fail(entry.offset, fmt::format("node {} has a child outside of the next level",
@@ -220,6 +226,23 @@ void ModelReader::checkNodes(const BlockEntry& entry) {
         }
         if (triangles > kMaxPageTriangles || vertices > kMaxPageVertices)
             fail(entry.offset, fmt::format("page {} states impossible counts", p));
+    }
+}
+
+/// Their groups' errors and spheres, which the file says once.
+void ModelReader::fillJoints() {
+    if (std::none_of(nodes_.begin(), nodes_.end(), [](const Node& n) { return n.is_joint; })) return;
+    std::unordered_map<uint32_t, NodeIndex> of_group;
+    for (const Node& node : nodes_)
+        if (!node.is_joint && !node.isLeaf())
+            of_group.emplace(node.group, NodeIndex(&node - nodes_.data()));
+    for (Node& node : nodes_) {
+        if (!node.is_joint) continue;
+        const auto found = of_group.find(node.group);
+        if (found == of_group.end())
+            fail(0, fmt::format("a joint of group {}, which is not there", node.group));
+        node.error = nodes_[found->second].error;
+        node.saturated = nodes_[found->second].saturated;
     }
 }
 

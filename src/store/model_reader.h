@@ -75,6 +75,7 @@ private:
     void readDirectory(const FileHeader& header, std::vector<BlockEntry>& directory) const;
     void readBlock(const BlockEntry& entry);
     void checkNodes(const BlockEntry& entry);
+    void fillJoints();
     [[noreturn]] void fail(uint64_t offset, const std::string& what) const;
     [[noreturn]] void failPage(uint32_t page, const std::string& fault) const;
 

@@ -42,7 +42,7 @@ constexpr size_t kFirstNodeColumn = kFlags;
 constexpr size_t kFirstGroupColumn = kGroup;
 
 constexpr uint32_t kHasChild[2] = {1, 2};
-constexpr uint32_t kClosed = 4;
+constexpr uint32_t kClosed = 4, kChildRange = 8, kJoint = 16;
 
 struct ConeCode {
     uint32_t axis;
@@ -102,6 +102,10 @@ public:
     void put(size_t column, uint32_t value) {
         columns_[column].push_back(zigzag(value - before_[column]));
         before_[column] = value;
+    }
+    /// The values before, in so many columns.
+    void repeat(size_t column, size_t count) {
+        for (size_t k = 0; k < count; ++k) columns_[column + k].push_back(0);
     }
     void putSphere(size_t column, const Sphere& sphere) {
         for (int axis = 0; axis < 3; ++axis) put(column + axis, bitsOf(sphere.centre[axis]));
@@ -199,7 +203,8 @@ std::vector<std::byte> encodeNodeBlock(std::span<const Node> nodes,
     uint32_t expected_child = 0;
     for (uint32_t i = 0; i < nodes.size(); ++i) {
         const Node& node = nodes[i];
-        uint32_t flags = node.closed ? kClosed : 0;
+        uint32_t flags = (node.closed ? kClosed : 0) | (node.child_range ? kChildRange : 0) |
+                         (node.is_joint ? kJoint : 0);
         for (int k = 0; k < 2; ++k) {
             const bool has = node.child[k] != kNoNode;
             if (has) flags |= kHasChild[k];
@@ -213,6 +218,12 @@ std::vector<std::byte> encodeNodeBlock(std::span<const Node> nodes,
         const ConeCode cone = encodeCone(node.cone);
         columns[kConeAxis].push_back(cone.axis);
         columns[kConeCosine].push_back(cone.cosine);
+        if (node.is_joint) {  // the group says the rest
+            columns[kGroupBack].push_back(0);
+            delta.put(kGroup, node.group);
+            delta.repeat(kSaturated, 5);
+            continue;
+        }
         const auto last = last_of_group.find(node.group);
         const bool shared =
             last != last_of_group.end() && sameRefinement(node, nodes[last->second]);
@@ -256,6 +267,8 @@ bool decodeNodeBlock(std::span<const std::byte> bytes, const BlockEntry& entry,
         Node node;
         const uint32_t flags = columns[kFlags][i];
         node.closed = (flags & kClosed) != 0;
+        node.child_range = (flags & kChildRange) != 0;
+        node.is_joint = (flags & kJoint) != 0;
         for (int k = 0; k < 2; ++k) {
             if ((flags & kHasChild[k]) == 0) continue;
             node.child[k] = expected_child + unzigzag(columns[kChild0 + k][i]);

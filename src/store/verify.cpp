@@ -91,8 +91,7 @@ constexpr std::array<std::pair<Finding, const char*>, 8> kFindingTexts = {{
 void checkForest(std::span<const Node> nodes, std::vector<uint8_t>& found) {
     std::vector<uint8_t> parents(nodes.size(), 0);
     for (const Node& node : nodes)
-        for (const NodeIndex child : node.child)
-            if (child != kNoNode && parents[child] < 2) ++parents[child];
+        node.forEachChild([&](NodeIndex child) { parents[child] += parents[child] < 2; });
     for (size_t i = 0; i < nodes.size(); ++i)
         if (parents[i] != (nodes[i].level == 0 ? 0 : 1)) found[i] |= kBadParents;
 }
@@ -102,11 +101,12 @@ void checkSaturation(std::span<const Node> nodes, std::vector<uint8_t>& found) {
         for (size_t i = begin; i < end; ++i) {
             const Node& node = nodes[i];
             if (!holds(node.saturated, node.bounds)) found[i] |= kBoundsOutside;
-            for (const NodeIndex child : node.child) {
-                if (child == kNoNode) continue;
-                if (!holds(node.saturated, nodes[child].saturated)) found[i] |= kChildOutside;
-                if (!(node.error >= nodes[child].error)) found[i] |= kErrorBelowChild;
-            }
+            node.forEachChild([&](NodeIndex c) {
+                const Node& child = nodes[c];
+                if (!holds(node.saturated, child.is_joint ? child.bounds : child.saturated))
+                    found[i] |= kChildOutside;
+                if (!child.is_joint && !(node.error >= child.error)) found[i] |= kErrorBelowChild;
+            });
             if (!(node.error >= 0)) found[i] |= kErrorBelowChild;
         }
     });
