@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "base/check.h"
-#include "geometry/morton.h"
 
 namespace pietra {
 
@@ -110,12 +109,6 @@ void cellPaths(std::span<const Vec3i> points, int scale, std::span<CellPath> pat
         }
         for (size_t k = 0; k < count; ++k) paths[begin + k] = result[k] << (61 - 3 * rounds);
     }
-}
-
-CellPath cubePath(const Vec3i& p) {
-    const uint64_t code = mortonCode({p.z, p.y, p.x});
-    constexpr int kLost = 3 * kLatticeBits - (3 + kMaxCellLevel);
-    return code >> kLost << (61 - kMaxCellLevel);
 }
 
 std::array<Vec3i, 4> cellCorners(CellId cell) {

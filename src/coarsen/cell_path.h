@@ -6,9 +6,9 @@
 // the partition. All predicates are exact in integers; points on a cell's face go to the second
 // child, so each point has exactly one path.
 //
-// Cubes (Wu and Huang 2014, section 5.1) are named likewise, by the octants along the way down: three
-// bits an octree level, the first of which are the root's, so that levels of cells that are cubes are
-// multiples of three; a triangle belongs to the last of the cells of its corners.
+// Cubes (Wu and Huang 2014, section 5.1) are named likewise, by the octants along the way down:
+// three bits an octree level, the first of which are the root's, so that levels of cells that are
+// cubes are multiples of three; a triangle belongs to the last of the cells of its corners.
 //
 // All cells of one level that share their refinement edge form a diamond; its key is the midpoint
 // of that edge. Pure functions, thread-safe.
@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "geometry/lattice.h"
+#include "geometry/morton.h"
 
 namespace pietra {
 
@@ -72,8 +73,13 @@ CellPath cellPath(const Vec3i& p, int scale, int level = kMaxCellLevel);
 void cellPaths(std::span<const Vec3i> points, int scale, std::span<CellPath> paths,
                int level = kMaxCellLevel);
 
-/// Of the cubes that hold p, of lattice units each in [0, 2^21). Its lowest bits get lost.
-CellPath cubePath(const Vec3i& p);
+/// Of the cubes that hold the point of this Morton code. Its lowest three bits get lost.
+inline CellPath cubePathOf(uint64_t code) {
+    return code >> 3 << 4;
+}
+inline CellPath cubePath(const Vec3i& p) {
+    return cubePathOf(mortonCode(p));
+}
 inline CellPath cubePath(const Vec3i& a, const Vec3i& b, const Vec3i& c) {
     return std::max({cubePath(a), cubePath(b), cubePath(c)});
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
+#include "methods/cluster/build.h"
 #include "methods/pmesh/build.h"
 #include "methods/pmesh/live_mesh.h"
 #include "methods/pmesh/model.h"
@@ -17,6 +18,8 @@ constexpr Method kMethods[] = {
      nullptr},
     {"pmesh", "progressive mesh: refined vertex by vertex, in fewer triangles", pmesh::build, true,
      pmesh::openModel, pmesh::openLive},
+    {"cluster", "octree and face clusters: every cell at the layer it likes", cluster::build, true,
+     nullptr},
 };
 
 const Method& methodOf(const ModelReader& reader) {

@@ -249,6 +249,53 @@ TEST(Cut, validateNamesTheFault) {
     EXPECT_EQ(validateCut({}, {}), "");
 }
 
+/// Two roots, each with two children and the joint that is drawn where it alone is refined.
+std::vector<Node> joinedPair() {
+    std::vector<Node> nodes(8);
+    for (Node& node : nodes) {
+        node.bounds = node.saturated = {Vec3f(0), 10};
+        node.triangles = 100;
+    }
+    for (const uint32_t root : {0u, 1u}) {
+        nodes[root].error = 4.0f + float(root);
+        nodes[root].group = root;
+        nodes[root].child_range = true;
+        nodes[root].child[0] = 2 + 3 * root;
+        nodes[root].child[1] = 4 + 3 * root;
+        for (const uint32_t child : {2u, 3u}) nodes[child + 3 * root].group = 10 + child + 3 * root;
+        nodes[4 + 3 * root].is_joint = true;
+        nodes[4 + 3 * root].group = 1 - root;
+        nodes[4 + 3 * root].error = 5.0f - float(root);
+        nodes[4 + 3 * root].triangles = 7;
+    }
+    return nodes;
+}
+
+TEST(Cut, jointsAreDrawnWhereOneSideIsFiner) {
+    const std::vector<Node> nodes = joinedPair();
+    EXPECT_TRUE(checkForest(nodes).ok()) << checkForest(nodes).first_fault;
+    using Nodes = std::vector<NodeIndex>;
+    EXPECT_EQ(rootCut(nodes).nodes, (Nodes{0, 1}));
+    EXPECT_EQ(cutByError(nodes, 4.5).nodes, (Nodes{0, 5, 6, 7}));
+    EXPECT_EQ(finestCut(nodes).nodes, (Nodes{2, 3, 5, 6}));
+    EXPECT_EQ(cutByHeight(nodes, 0).nodes, finestCut(nodes).nodes);
+    EXPECT_EQ(validateCut(nodes, Nodes{0, 5, 6, 7}), "");
+    EXPECT_EQ(validateCut(nodes, Nodes{2, 3, 4, 1}), "");
+    EXPECT_EQ(validateCut(nodes, Nodes{0, 5, 6}), "group 0 is refined at node 7 but not at node 0");
+    EXPECT_NE(validateCut(nodes, Nodes{2, 3, 5, 6, 7}), "");
+    EXPECT_NE(validateCut(nodes, Nodes{0, 1, 7}), "");
+    EXPECT_EQ(cutByTriangles(nodes, 306).nodes, rootCut(nodes).nodes);
+    EXPECT_EQ(cutByTriangles(nodes, 307).nodes, (Nodes{0, 5, 6, 7}));
+    EXPECT_EQ(cutByTriangles(nodes, 400).nodes, finestCut(nodes).nodes);
+    std::set<Nodes> seen;
+    for (uint64_t seed = 0; seed < 200; ++seed) {
+        const Cut cut = randomCut(nodes, seed);
+        EXPECT_EQ(validateCut(nodes, cut.nodes), "") << seed;
+        seen.insert(cut.nodes);
+    }
+    EXPECT_EQ(seen.size(), 4u);
+}
+
 TEST(Cut, emptyAndSingleNodeModels) {
     EXPECT_TRUE(rootCut({}).nodes.empty());
     EXPECT_TRUE(randomCut({}, 1).nodes.empty());

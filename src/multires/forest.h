@@ -3,8 +3,9 @@
 //
 // A group is refined as a whole: all its nodes are replaced by their children at once. A group may
 // be refined only once all its nodes exist, that is, once the groups of all their parents are
-// refined; but for joints, which may come and go. Memory: 16 bytes a node. Complexity: linear, but for one sort of the group numbers.
-// Immutable once built, so any number of threads may read it. Deterministic.
+// refined; but for joints, which may come and go. Memory: 16 bytes a node. Complexity: linear, but
+// for one sort of the group numbers. Immutable once built, so any number of threads may read it.
+// Deterministic.
 
 #include <cstdint>
 #include <span>

@@ -2,18 +2,19 @@
 // The multiresolution contract, part one: nodes, their error, and the cut rule.
 //
 // A model is a table of nodes. A node is the unit of refinement on disk: it has one patch (a small
-// mesh) and two children, or a range of them, whose patches together replace it. Nodes of one `group` (a diamond
-// of Adaptive TetraPuzzles) are refined only together: they have equal `error` and equal
-// `saturated` sphere, so every criterion that depends on these two alone treats them alike.
-// Parents' errors are at least their children's, and parents' saturated spheres enclose their
-// children's, hence any criterion that is monotone in (error, sphere) selects a valid, crack-free
-// cut.
+// mesh) and two children, or a range of them, whose patches together replace it. Nodes of one
+// `group` (a diamond of Adaptive TetraPuzzles) are refined only together: they have equal `error`
+// and equal `saturated` sphere, so every criterion that depends on these two alone treats them
+// alike. Parents' errors are at least their children's, and parents' saturated spheres enclose
+// their children's, hence any criterion that is monotone in (error, sphere) selects a valid,
+// crack-free cut.
 //
 // Parts that are refined independently of each other are joined where one is finer than the other
-// (docs/design/cluster.md): a *joint* is a child of the finer side's parent, and of the group of the
-// coarser side. It is drawn while its parent is refined and its group is not, so it has the group's
-// error and sphere, and when the group is refined, nothing takes its place. What it adds lies in the
-// page of its siblings. Source: Cignoni et al. 2004, sections 3 and 4. Units: lattice units (geometry/lattice.h).
+// (docs/design/cluster.md): a *joint* is a child of the finer side's parent, and of the group of
+// the coarser side. It is drawn while its parent is refined and its group is not, so it has the
+// group's error and sphere, and when the group is refined, nothing takes its place. What it adds
+// lies in the page of its siblings. Source: Cignoni et al. 2004, sections 3 and 4. Units: lattice
+// units (geometry/lattice.h).
 
 #include <cstdint>
 #include <limits>
@@ -42,8 +43,8 @@ struct Node {
     uint16_t level = 0;                       ///< depth in the hierarchy; roots are 0
     uint32_t triangles = 0;                   ///< of the patch
     uint32_t vertices = 0;                    ///< of the patch
-    bool closed = false;  ///< belongs to closed, consistently oriented components only: may be
-                          ///< culled by its cone, drawn one-sided
+    bool closed = false;       ///< belongs to closed, consistently oriented components only: may be
+                               ///< culled by its cone, drawn one-sided
     bool child_range = false;  ///< its children are all nodes from child[0] to child[1]
     bool is_joint = false;
     /// Nothing finer may take its place.

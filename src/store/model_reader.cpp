@@ -76,8 +76,12 @@ ModelReader::ModelReader(const std::string& path) : file_(path, File::Mode::kRea
     }
     for (const BlockEntry& entry : directory) readBlock(entry);
     fillJoints();
-    uint64_t triangles = 0;
-    for (const Node& node : nodes_) triangles += node.triangles;
+    uint64_t triangles = 0, range_children = 0;
+    for (const Node& node : nodes_) {
+        triangles += node.triangles;
+        if (node.child_range) range_children += node.child[1] - node.child[0] + 1;
+    }
+    if (range_children > nodes_.size()) fail(sizeof header, "nodes have too many children");
     if (triangles != info_.triangles_stored)
         fail(offsetof(FileHeader, triangles_stored),
              fmt::format("the nodes hold {} triangles, the header says {}", triangles,
@@ -231,7 +235,8 @@ void ModelReader::checkNodes(const BlockEntry& entry) {
 
 /// Their groups' errors and spheres, which the file says once.
 void ModelReader::fillJoints() {
-    if (std::none_of(nodes_.begin(), nodes_.end(), [](const Node& n) { return n.is_joint; })) return;
+    if (std::none_of(nodes_.begin(), nodes_.end(), [](const Node& n) { return n.is_joint; }))
+        return;
     std::unordered_map<uint32_t, NodeIndex> of_group;
     for (const Node& node : nodes_)
         if (!node.is_joint && !node.isLeaf())

@@ -11,9 +11,6 @@ namespace pietra::cluster {
 
 namespace {
 
-/// Of the vertices that a cell can do without, it keeps this part, whose leaving would cost most.
-constexpr size_t kKeptPart = 8;
-
 uint64_t pairKey(uint32_t a, uint32_t b) {
     return uint64_t(std::min(a, b)) << 32 | std::max(a, b);
 }
@@ -51,8 +48,8 @@ bool isRegular(const Mesh& mesh, std::span<const EdgeUse> uses) {
     return uses.size() == 2 && beginOf(mesh, uses[0].corner) == endOf(mesh, uses[1].corner);
 }
 
-/// Whether the faces around an interface's vertex form a disc with a simple outline, which without
-/// the vertex still has three corners.
+}  // namespace
+
 bool fanMayMerge(const PolygonMesh& mesh, std::span<const uint32_t> fan) {
     std::set<uint32_t> faces, vertices, begins;
     for (const uint32_t h : fan) faces.insert(mesh.face[h]);
@@ -71,8 +68,6 @@ bool fanMayMerge(const PolygonMesh& mesh, std::span<const uint32_t> fan) {
     const size_t edges = (half_edges + begins.size()) / 2;
     return vertices.size() + faces.size() == edges + 1;
 }
-
-}  // namespace
 
 Interfaces::Interfaces(const Mesh& mesh, const CellTriangles& cells)
     : position_(mesh.position),

@@ -70,6 +70,13 @@ private:
     std::vector<Strip> strips_;
 };
 
+/// Of the vertices that a cell can do without, it keeps this part, whose leaving would cost most.
+inline constexpr size_t kKeptPart = 8;
+
+/// Whether the faces around an interface's vertex form a disc with a simple outline, which without
+/// the vertex still has three corners. `fan`: the half-edges that begin there.
+bool fanMayMerge(const PolygonMesh& mesh, std::span<const uint32_t> fan);
+
 /// Faces of a cell that become one as vertices leave its interfaces.
 Groups fansWithout(const PolygonMesh& cell, std::span<const uint8_t> removed);
 

@@ -1,6 +1,7 @@
 #include "methods/cluster/layer_step.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -35,6 +36,24 @@ float largestOf(const FaceBounds& bounds, float least) {
     for (const float a : bounds.to_original) least = std::max(least, a);
     for (const float b : bounds.from_original) least = std::max(least, b);
     return least;
+}
+
+/// Of each triangle of the layer, whether it is another one than what was mapped to it.
+std::vector<uint8_t> changedTriangles(const Mesh& below, const Mesh& layer,
+                                      std::span<const uint32_t> triangle_map) {
+    const auto corners = [](const Mesh& mesh, size_t t) {
+        const auto& [a, b, c] = mesh.triangle[t];
+        std::array keys = {latticeKey(mesh.position[a]), latticeKey(mesh.position[b]),
+                           latticeKey(mesh.position[c])};
+        std::sort(keys.begin(), keys.end());
+        return keys;
+    };
+    std::vector<uint8_t> changed(layer.triangleCount(), 1);
+    for (size_t t = 0; t < triangle_map.size(); ++t)
+        if (const uint32_t to = triangle_map[t];
+            to < changed.size() && corners(below, t) == corners(layer, to))
+            changed[to] = 0;
+    return changed;
 }
 
 }  // namespace
@@ -129,6 +148,8 @@ float boundLayer(const Mesh& below, float error, const Mesh& layer,
     step.before_bounds = &bounds;
     step.after = &after;
     step.triangle_map = triangle_map;
+    const std::vector<uint8_t> changed = changedTriangles(below, layer, triangle_map);
+    step.triangle_changed = changed;
     step.child_error = error;
     step.before_takes = uint32_t(strips.taken.triangleCount());
     step.after_takes = uint32_t(strips.given.triangleCount());

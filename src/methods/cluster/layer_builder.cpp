@@ -1,0 +1,439 @@
+#include "methods/cluster/layer_builder.h"
+
+#include <algorithm>
+#include <map>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "base/check.h"
+#include "base/parallel.h"
+#include "coarsen/mesh_joiner.h"
+#include "geometry/enclosing_ball.h"
+#include "methods/cluster/cell_layer.h"
+#include "methods/cluster/fallback.h"
+#include "methods/cluster/layer_step.h"
+#include "store/page_codec.h"
+
+namespace pietra::cluster {
+
+namespace {
+
+/// A page holds the children of whole nodes, at least this many triangles of them; fewer in the
+/// coarse levels, so that all threads have work there, and a first picture needs little.
+constexpr uint64_t kPageTriangles = 8192, kSmallestPageTriangles = 1024, kUnitsOfLevel = 16;
+
+/// What a finished cell waits with for the next layer.
+struct CellState {
+    Node node;
+    uint64_t position = 0;  // in the layers' spill
+    size_t bytes = 0;
+};
+
+struct Unit {
+    size_t first = 0, end = 0;  // steps
+};
+
+/// A cell's new layer. Its node's children are counted from the first node of the page.
+struct Finished {
+    CellId cell;
+    CellState state;
+};
+
+struct UnitResult {
+    std::vector<std::byte> page;
+    std::vector<Node> nodes;
+    std::vector<Finished> finished;
+    uint64_t triangles = 0;
+};
+
+/// Scratch of one thread.
+struct Worker {
+    Deviation deviation;
+    CellMesh leaf;
+    std::vector<Vec3f> normals;
+};
+
+Node describe(const Mesh& mesh, bool closed, Worker& worker) {
+    Node node;
+    node.triangles = uint32_t(mesh.triangleCount());
+    node.vertices = uint32_t(mesh.vertexCount());
+    node.closed = closed;
+    node.bounds = enclosingBall(std::span<const Vec3i>(mesh.position));
+    worker.normals.clear();
+    for (const Triangle& t : mesh.triangle) {
+        const Vec3i& a = mesh.position[t[0]];
+        const Vec3d n(crossInteger(mesh.position[t[1]] - a, mesh.position[t[2]] - a));
+        const double length = glm::length(n);
+        if (length > 0) worker.normals.push_back(Vec3f(n / length));
+    }
+    node.cone = enclosingCone(worker.normals);
+    return node;
+}
+
+/// Lattice points of a cell's cube that are nobody's vertices.
+class FreePoints {
+public:
+    FreePoints(CellId cell, int shift, const InterfaceTable& table) : shift_(shift), table_(table) {
+        const int bits = kLatticeBits - depthOf(cell);
+        if (cell > 1) {
+            const Vec3i corner = cubeCorner(cell);
+            low_ = corner;
+            high_ = glm::min(corner + ((1 << bits) - 1), Vec3i(kLatticeMax));
+        }
+    }
+    void take(const std::vector<Vec3i>& points) {
+        for (const Vec3i& p : points) taken_.insert(latticeKey(p));
+    }
+    /// Near another one, and none given before.
+    Vec3i near(const Vec3i& wanted) {
+        const int32_t step = 1 << shift_;
+        const Vec3i first = glm::clamp(snapToShift(wanted, shift_), low_, high_) >> shift_
+                                                                                        << shift_;
+        for (int32_t reach = 0; reach <= kLatticeMax; reach += step)
+            for (int32_t x = -reach; x <= reach; x += step)
+                for (int32_t y = -reach; y <= reach; y += step)
+                    for (int32_t z = -reach; z <= reach; z += step) {
+                        if (std::max({std::abs(x), std::abs(y), std::abs(z)}) != reach) continue;
+                        const Vec3i p = first + Vec3i(x, y, z);
+                        if (p != glm::clamp(p, low_, high_) || table_.find(p) != kNone) continue;
+                        if (taken_.insert(latticeKey(p)).second) return p;
+                    }
+        CHECK(false);
+        return wanted;
+    }
+
+private:
+    static Vec3i cubeCorner(CellId cell) {
+        Vec3i corner(0);
+        for (int bit = kLatticeBits - depthOf(cell); cell > 1; cell >>= 3, ++bit)
+            corner |= Vec3i(int32_t(cell & 1), int32_t(cell >> 1 & 1), int32_t(cell >> 2 & 1))
+                      << bit;
+        return corner;
+    }
+
+    int shift_;
+    const InterfaceTable& table_;
+    Vec3i low_{0}, high_{kLatticeMax};
+    std::unordered_set<uint64_t> taken_;
+};
+
+class Builder {
+public:
+    Builder(InputLeaves& input, const BuilderSettings& settings, TempSpace& space,
+            ModelWriter& writer, Progress& progress)
+        : leaves_(input.leaves),
+          settings_(settings),
+          space_(space),
+          writer_(writer),
+          progress_(progress),
+          octree_(octreeOf(leaves_)),
+          groups_(uint32_t(octree_.leaves().size())) {
+        page_settings_.shift = settings.shift;
+        page_settings_.colours = settings.schema.colours;
+        page_settings_.scalar_count = int(settings.schema.scalars.size());
+    }
+
+    BuilderCounts run() {
+        progress_.beginStage("interfaces", 0);
+        table_ = std::make_unique<InterfaceTable>(octree_, leaves_, *space_.budget, progress_);
+        // Layers have 4/3 of the input's triangles together: only progress depends on this guess.
+        progress_.beginStage("cluster", leaves_.triangles * 4 / 3);
+        for (layer_ = 1; layer_ <= octree_.topLayer(); ++layer_) buildLayer();
+        writeTop();
+        return counts_;
+    }
+
+private:
+    static Octree octreeOf(const Leaves& leaves) {
+        std::vector<CellId> cells;
+        for (const CellId leaf : leaves.tree->leaves())
+            if (leaves.blobs.contains(leaf)) cells.push_back(leaf);
+        return Octree(std::move(cells));
+    }
+
+    void buildLayer();
+    std::vector<Unit> unitsOf() const;
+    uint64_t trianglesOf(const CellStep& step) const;
+    bool isFirst(const CellStep& step) const {
+        return step.cell == step.below[0] && octree_.firstLayer(step.cell) == layer_ - 1;
+    }
+    /// What the step begins with, and the nodes of that.
+    CellLayer load(const CellStep& step, Worker& worker, std::vector<CellLayer>* below) const;
+    UnitResult runUnit(const Unit& unit);
+    void runStep(size_t index, UnitResult& result, std::vector<CellLayer>& patches,
+                 std::vector<Mesh>& joints);
+    LayerStep makeLayer(const CellStep& step, const CellLayer& base) const;
+    Mesh addJoints(const CellStep& step, const CellLayer& base, bool closed, UnitResult& result,
+                   std::vector<Mesh>& joints, std::vector<Sphere>& balls, Worker& worker) const;
+    Node leafNode(const CellStep& step, const CellLayer& layer, Worker& worker) const;
+    void write(UnitResult& result);
+    void writeTop();
+
+    Leaves& leaves_;
+    const BuilderSettings& settings_;
+    TempSpace& space_;
+    ModelWriter& writer_;
+    Progress& progress_;
+    PageSettings page_settings_;
+    PerThread<Worker> workers_;
+    const Octree octree_;
+    uint32_t groups_;  // of the steps of this layer: from here on
+    std::unique_ptr<InterfaceTable> table_;
+    int layer_ = 0;
+    std::vector<CellStep> steps_;
+    std::unique_ptr<Removals> removals_;
+    std::unordered_map<CellId, CellState> below_, states_;
+    std::unique_ptr<Spill> layers_below_, layers_;
+    NodeIndex nodes_in_level_ = 0;
+    BuilderCounts counts_;
+};
+
+uint64_t Builder::trianglesOf(const CellStep& step) const {
+    if (isFirst(step)) return leaves_.blobs.at(step.cell).triangles;
+    uint64_t triangles = 0;
+    for (const CellId cell : step.below) triangles += below_.at(cell).node.triangles;
+    return triangles;
+}
+
+std::vector<Unit> Builder::unitsOf() const {
+    uint64_t of_level = 0;
+    for (const CellStep& step : steps_) of_level += trianglesOf(step);
+    const uint64_t enough =
+        std::clamp(of_level / kUnitsOfLevel, kSmallestPageTriangles, kPageTriangles);
+    std::vector<Unit> units;
+    uint64_t triangles = enough;
+    for (size_t i = 0; i < steps_.size(); ++i) {
+        if (triangles >= enough) {
+            units.push_back({i, i});
+            triangles = 0;
+        }
+        triangles += trianglesOf(steps_[i]);
+        units.back().end = i + 1;
+    }
+    return units;
+}
+
+void Builder::buildLayer() {
+    steps_ = octree_.stepsOf(layer_);
+    removals_ = std::make_unique<Removals>(*table_, layer_, *space_.budget);
+    parallelFor(steps_.size(), [&](size_t i) {
+        const CellLayer base = load(steps_[i], workers_.local(), nullptr);
+        removals_->report(steps_[i].cell, base.polygons, base.joined);
+        progress_.tick(0);
+    });
+    removals_->choose();
+
+    layers_ = std::make_unique<Spill>(space_);
+    states_.clear();
+    nodes_in_level_ = 0;
+    writer_.beginLevel(uint32_t(octree_.topLayer() - layer_ + 1));
+    const std::vector<Unit> units = unitsOf();
+    orderedPipeline(
+        units.size(), size_t(settings_.jobs) * 2, [&](size_t u) { return runUnit(units[u]); },
+        [&](UnitResult& result) { write(result); });
+    groups_ += uint32_t(steps_.size());
+    below_ = std::move(states_);
+    layers_below_ = std::move(layers_);
+}
+
+CellLayer Builder::load(const CellStep& step, Worker& worker, std::vector<CellLayer>* below) const {
+    std::vector<CellLayer> layers;
+    if (isFirst(step)) {
+        const CellBlob& blob = leaves_.blobs.at(step.cell);
+        blob.store->get(blob, worker.leaf);
+        layers.push_back(
+            firstLayer(worker.leaf, settings_.quantisation_error, step.cell, octree_, *table_));
+    } else {
+        for (const CellId cell : step.below) {
+            const CellState& state = below_.at(cell);
+            std::vector<std::byte> bytes(state.bytes);
+            layers_below_->read(state.position, bytes);
+            layers.push_back(unpackLayer(std::move(bytes)));
+        }
+    }
+    CellLayer base = joinLayers(layers, layer_, *table_);
+    if (below) *below = std::move(layers);
+    return base;
+}
+
+Node Builder::leafNode(const CellStep& step, const CellLayer& layer, Worker& worker) const {
+    Node node = describe(layer.triangles.mesh, layer.closed, worker);
+    node.saturated = node.bounds;
+    node.error = layer.error;
+    node.group = uint32_t(octree_.leafNumber(step.cell));
+    return node;
+}
+
+LayerStep Builder::makeLayer(const CellStep& step, const CellLayer& base) const {
+    std::vector<uint8_t> removed(base.polygons.vertexCount(), 0);
+    for (uint32_t v = 0; v < removed.size(); ++v)
+        if (base.polygons.interface_[v])
+            removed[v] = removals_->isRemoved(table_->find(base.polygons.position[v]));
+    const bool first = isFirst(step);
+    LayerStep next =
+        nextLayer(base.polygons, base.triangles, removed,
+                  first ? settings_.first_faces : settings_.faces, settings_.clustering);
+    // Above the leaves, cells are to be about as large as theirs are in their last layer.
+    const bool is_leaf = step.cell == step.below[0];
+    size_t target = base.triangles.mesh.triangleCount() / 4;
+    if (!is_leaf) target = std::min<size_t>(target, settings_.leaf_triangles / 8);
+    if (next.triangles.mesh.triangleCount() > target + target / 2) dropComponents(next, target);
+    if (!next.triangles.to_free.empty()) {
+        FreePoints points(step.cell, settings_.shift, *table_);
+        points.take(base.triangles.mesh.position);
+        points.take(base.inner.position);
+        for (const uint32_t v : next.triangles.to_free) {
+            Vec3i& p = next.triangles.mesh.position[v];
+            p = points.near(p);
+        }
+    }
+    return next;
+}
+
+/// The strips of this cell, for where it is below the layer and the other cell is not: a joint for
+/// each other cell. Returns all strips.
+Mesh Builder::addJoints(const CellStep& step, const CellLayer& base, bool closed,
+                        UnitResult& result, std::vector<Mesh>& joints, std::vector<Sphere>& balls,
+                        Worker& worker) const {
+    const PolygonMesh& polygons = base.polygons;
+    std::unordered_map<uint32_t, uint32_t> vertex_of;  // by number in the table
+    std::map<CellId, std::vector<uint32_t>> removed;   // by the other cell
+    for (uint32_t v = 0; v < polygons.vertexCount(); ++v) {
+        if (!polygons.interface_[v]) continue;
+        const uint32_t number = table_->find(polygons.position[v]);
+        vertex_of.emplace(number, v);
+        if (removals_->isRemoved(number))
+            removed[removals_->otherCell(number, step.cell)].push_back(number);
+    }
+    Mesh strips;
+    for (auto& [other, numbers] : removed) {
+        std::sort(numbers.begin(), numbers.end());
+        Mesh joint;
+        MeshJoiner joiner;
+        joiner.begin(joint, numbers.size() * 2);
+        std::vector<Vec3i> points;
+        for (const uint32_t number : numbers) {
+            const auto [before, after] = removals_->neighbours(number, step.cell);
+            Triangle triangle;
+            for (size_t k = 0; k < 3; ++k) {
+                const uint32_t v = vertex_of.at(k == 0 ? before : k == 1 ? after : number);
+                triangle[k] = joiner.addVertex(base.triangles.mesh, v);
+                points.push_back(polygons.position[v]);
+                strips.position.push_back(polygons.position[v]);
+            }
+            joint.triangle.push_back(triangle);
+            joint.edge_class.push_back(0);
+            const uint32_t end = uint32_t(strips.position.size());
+            strips.triangle.push_back({end - 3, end - 2, end - 1});
+        }
+        Node node = describe(joint, closed, worker);
+        // The same for both sides.
+        std::sort(points.begin(), points.end(),
+                  [](const Vec3i& a, const Vec3i& b) { return latticeKey(a) < latticeKey(b); });
+        points.erase(std::unique(points.begin(), points.end()), points.end());
+        node.bounds = enclosingBall(std::span<const Vec3i>(points));
+        node.is_joint = true;
+        const auto at = std::lower_bound(
+            steps_.begin(), steps_.end(), other, [](const CellStep& s, CellId cell) {
+                return cell != 1 && (s.cell == 1 || firstPath(s.cell) < firstPath(cell));
+            });
+        CHECK(at != steps_.end() && at->cell == other);
+        node.group = groups_ + uint32_t(at - steps_.begin());
+        balls.push_back(node.bounds);
+        result.nodes.push_back(node);
+        joints.push_back(std::move(joint));
+    }
+    return strips;
+}
+
+void Builder::runStep(size_t index, UnitResult& result, std::vector<CellLayer>& patches,
+                      std::vector<Mesh>& joints) {
+    const CellStep& step = steps_[index];
+    Worker& worker = workers_.local();
+    std::vector<CellLayer> below;
+    const CellLayer base = load(step, worker, &below);
+    const NodeIndex first = NodeIndex(result.nodes.size());
+    std::vector<Sphere> spheres;
+    for (size_t c = 0; c < below.size(); ++c) {
+        result.nodes.push_back(isFirst(step) ? leafNode(step, below[c], worker)
+                                             : below_.at(step.below[c]).node);
+        spheres.push_back(result.nodes.back().saturated);
+    }
+    const float error = base.error;
+    const Mesh strips = addJoints(step, base, base.closed, result, joints, spheres, worker);
+    const std::vector<float> strip_bounds =
+        boundStrips(strips, base.triangles.mesh, error, base.bounds);
+    LayerStep next = makeLayer(step, base);
+    FaceBounds bounds = base.bounds;
+    const float bound = boundLayer(base.triangles.mesh, error, next.triangles.mesh,
+                                   next.triangle_map, worker.deviation, bounds);
+    CellLayer layer = carryOver(base, std::move(next.polygons), std::move(next.triangles));
+    layer.bounds = std::move(bounds);
+    layer.joined = base.joined;
+    layer.error = bound;
+    for (const float b : strip_bounds) layer.error = std::max(layer.error, b);
+
+    Finished done{step.cell, {}};
+    Node& node = done.state.node;
+    node = describe(layer.triangles.mesh, layer.closed, worker);
+    spheres.push_back(node.bounds);
+    node.saturated = enclosingBall(spheres);
+    node.error = layer.error;
+    node.group = groups_ + uint32_t(index);
+    node.child_range = true;
+    node.child[0] = first;
+    node.child[1] = NodeIndex(result.nodes.size() - 1);
+    const std::vector<std::byte> packed = packLayer(layer);
+    done.state.position = layers_->append(packed);
+    done.state.bytes = packed.size();
+    result.finished.push_back(done);
+    result.triangles += base.triangles.mesh.triangleCount();
+    for (CellLayer& one : below) patches.push_back(std::move(one));
+}
+
+UnitResult Builder::runUnit(const Unit& unit) {
+    UnitResult result;
+    std::vector<std::vector<CellLayer>> patches(unit.end - unit.first);
+    std::vector<std::vector<Mesh>> joints(unit.end - unit.first);
+    std::vector<const Mesh*> meshes;
+    for (size_t i = 0; i < patches.size(); ++i) {
+        runStep(unit.first + i, result, patches[i], joints[i]);
+        for (const CellLayer& layer : patches[i]) meshes.push_back(&layer.triangles.mesh);
+        for (const Mesh& joint : joints[i]) meshes.push_back(&joint);
+    }
+    result.page = encodePage(meshes, page_settings_);
+    progress_.tick(result.triangles);
+    return result;
+}
+
+void Builder::write(UnitResult& result) {
+    for (const Node& node : result.nodes) counts_.triangles += node.triangles;
+    writer_.addPage(result.page, result.nodes);
+    for (auto& [cell, state] : result.finished) {
+        for (NodeIndex& child : state.node.child) child += nodes_in_level_;
+        states_.emplace(cell, state);
+    }
+    nodes_in_level_ += NodeIndex(result.nodes.size());
+}
+
+void Builder::writeTop() {
+    CHECK_EQ(below_.size(), size_t(1));
+    auto& [cell, state] = *below_.begin();
+    std::vector<std::byte> bytes(state.bytes);
+    layers_below_->read(state.position, bytes);
+    const CellLayer layer = unpackLayer(std::move(bytes));
+    const Mesh* mesh = &layer.triangles.mesh;
+    writer_.beginLevel(0);
+    writer_.addPage(encodePage({&mesh, 1}, page_settings_), {&state.node, 1});
+    counts_.triangles += state.node.triangles;
+    counts_.levels = uint32_t(octree_.topLayer()) + 1;
+}
+
+}  // namespace
+
+BuilderCounts buildLayers(InputLeaves& input, const BuilderSettings& settings, TempSpace& space,
+                          ModelWriter& writer, Progress& progress) {
+    return Builder(input, settings, space, writer, progress).run();
+}
+
+}  // namespace pietra::cluster
