@@ -157,10 +157,10 @@ private:
     bool isFirst(const CellStep& step) const {
         return step.cell == step.below[0] && octree_.firstLayer(step.cell) == layer_ - 1;
     }
-    /// What the step begins with, and the nodes of that.
+    /// What the step begins with, and if that is more than one layer, these, unless null.
     CellLayer load(const CellStep& step, Worker& worker, std::vector<CellLayer>* below) const;
     UnitResult runUnit(const Unit& unit);
-    void runStep(size_t index, UnitResult& result, std::vector<CellLayer>& patches,
+    void runStep(size_t index, UnitResult& result, std::vector<Mesh>& patches,
                  std::vector<Mesh>& joints);
     LayerStep makeLayer(const CellStep& step, const CellLayer& base) const;
     Mesh addJoints(const CellStep& step, const CellLayer& base, bool closed, UnitResult& result,
@@ -250,6 +250,10 @@ CellLayer Builder::load(const CellStep& step, Worker& worker, std::vector<CellLa
             layers_below_->read(state.position, bytes);
             layers.push_back(unpackLayer(std::move(bytes)));
         }
+    }
+    if (layers.size() == 1) {
+        continueLayer(layers[0], layer_, *table_);
+        return std::move(layers[0]);
     }
     CellLayer base = joinLayers(layers, layer_, *table_);
     if (below) *below = std::move(layers);
@@ -346,17 +350,16 @@ Mesh Builder::addJoints(const CellStep& step, const CellLayer& base, bool closed
     return strips;
 }
 
-void Builder::runStep(size_t index, UnitResult& result, std::vector<CellLayer>& patches,
+void Builder::runStep(size_t index, UnitResult& result, std::vector<Mesh>& patches,
                       std::vector<Mesh>& joints) {
     const CellStep& step = steps_[index];
     Worker& worker = workers_.local();
     std::vector<CellLayer> below;
-    const CellLayer base = load(step, worker, &below);
+    CellLayer base = load(step, worker, &below);
     const NodeIndex first = NodeIndex(result.nodes.size());
     std::vector<Sphere> spheres;
-    for (size_t c = 0; c < below.size(); ++c) {
-        result.nodes.push_back(isFirst(step) ? leafNode(step, below[c], worker)
-                                             : below_.at(step.below[c]).node);
+    for (const CellId cell : step.below) {
+        result.nodes.push_back(isFirst(step) ? leafNode(step, base, worker) : below_.at(cell).node);
         spheres.push_back(result.nodes.back().saturated);
     }
     const float error = base.error;
@@ -388,17 +391,17 @@ void Builder::runStep(size_t index, UnitResult& result, std::vector<CellLayer>& 
     done.state.bytes = packed.size();
     result.finished.push_back(done);
     result.triangles += base.triangles.mesh.triangleCount();
-    for (CellLayer& one : below) patches.push_back(std::move(one));
+    if (below.empty()) patches.push_back(std::move(base.triangles.mesh));
+    for (CellLayer& one : below) patches.push_back(std::move(one.triangles.mesh));
 }
 
 UnitResult Builder::runUnit(const Unit& unit) {
     UnitResult result;
-    std::vector<std::vector<CellLayer>> patches(unit.end - unit.first);
-    std::vector<std::vector<Mesh>> joints(unit.end - unit.first);
+    std::vector<std::vector<Mesh>> patches(unit.end - unit.first), joints(patches.size());
     std::vector<const Mesh*> meshes;
     for (size_t i = 0; i < patches.size(); ++i) {
         runStep(unit.first + i, result, patches[i], joints[i]);
-        for (const CellLayer& layer : patches[i]) meshes.push_back(&layer.triangles.mesh);
+        for (const Mesh& patch : patches[i]) meshes.push_back(&patch);
         for (const Mesh& joint : joints[i]) meshes.push_back(&joint);
     }
     result.page = encodePage(meshes, page_settings_);
