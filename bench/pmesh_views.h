@@ -10,19 +10,27 @@
 namespace pietra::pmesh {
 
 /// Towards the middle of the box, from so many of its diagonals away.
-inline Criterion viewFrom(const Box3d& box, const Lattice& lattice, double turn, double distance,
-                          double pixels) {
+inline View cameraFrom(const Box3d& box, const Lattice& lattice, double turn, double distance) {
     Camera camera;
     const double size = glm::length(box.max - box.min);
     camera.target = (box.min + box.max) * 0.5;
     camera.eye = camera.target + size * distance * Vec3d(std::cos(turn), std::sin(turn), 0.3);
-    return criterionOf(View(camera, {1920, 1080}, lattice), lattice, pixels);
+    return View(camera, {1920, 1080}, lattice);
+}
+
+inline Criterion viewFrom(const Box3d& box, const Lattice& lattice, double turn, double distance,
+                          double pixels) {
+    return criterionOf(cameraFrom(box, lattice, turn, distance), lattice, pixels);
 }
 
 /// To and fro while it circles, eight frames a round.
-inline Criterion stormView(const Box3d& box, const Lattice& lattice, int frame, double pixels) {
+inline View stormCamera(const Box3d& box, const Lattice& lattice, int frame) {
     const double t = std::abs(frame % 8 - 4) / 4.0;
-    return viewFrom(box, lattice, 0.05 * frame, 0.4 + 1.6 * t, pixels);
+    return cameraFrom(box, lattice, 0.05 * frame, 0.4 + 1.6 * t);
+}
+
+inline Criterion stormView(const Box3d& box, const Lattice& lattice, int frame, double pixels) {
+    return criterionOf(stormCamera(box, lattice, frame), lattice, pixels);
 }
 
 }  // namespace pietra::pmesh

@@ -22,7 +22,14 @@ void setEdgeClasses(Mesh& mesh, const HalfEdges& edges) {
     }
 }
 
-SimplifyOutput collapseAll(const Mesh& mesh, int shift, Recorder& recorder) {
+/// Sets edge classes; the irregular vertices.
+std::vector<uint8_t> prepare(Mesh& mesh) {
+    HalfEdges edges = findHalfEdges(mesh.triangle, mesh.vertexCount());
+    setEdgeClasses(mesh, edges);
+    return std::move(edges.irregular);
+}
+
+SimplifyOutput collapseAll(const Mesh& mesh, int shift, CollapseSink& sink) {
     const std::vector<uint8_t> cell(mesh.triangleCount(), 0);
     const std::vector<uint32_t> quota{0};
     SimplifyInput input;
@@ -31,7 +38,7 @@ SimplifyOutput collapseAll(const Mesh& mesh, int shift, Recorder& recorder) {
     input.quota = quota;
     input.shift = shift;
     input.scalar_count = int(WordLayout::of(mesh).scalars);
-    input.sink = &recorder;
+    input.sink = &sink;
     Simplifier simplifier;
     SimplifyOutput output;
     simplifier.run(input, output);
@@ -68,12 +75,7 @@ NodeForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget, BuildC
         budget.reserve(kBuildBytes * mesh.triangleCount(), "a progressive mesh, built in memory,");
     BuildCounts unused;
     BuildCounts& c = counts ? *counts : unused;
-    std::vector<uint8_t> irregular;
-    {
-        HalfEdges edges = findHalfEdges(mesh.triangle, mesh.vertexCount());
-        setEdgeClasses(mesh, edges);
-        irregular = std::move(edges.irregular);
-    }
+    const std::vector<uint8_t> irregular = prepare(mesh);
     c.irregular_vertices = uint64_t(std::count(irregular.begin(), irregular.end(), 1));
     Recorder recorder(mesh, irregular, lattice.shift);
     const SimplifyOutput base = collapseAll(mesh, lattice.shift, recorder);
@@ -93,6 +95,16 @@ NodeForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget, BuildC
     forest.node = std::move(nodes);
     forest.row = std::move(rows);
     return forest;
+}
+
+void collapseInCore(
+    Mesh mesh, const Lattice& lattice, Budget& budget,
+    const std::function<std::unique_ptr<CollapseSink>(Recorder& recorder)>& sink) {
+    const Reservation memory =
+        budget.reserve(kBuildBytes * mesh.triangleCount(), "a simplification in memory");
+    const std::vector<uint8_t> irregular = prepare(mesh);
+    Recorder recorder(mesh, irregular, lattice.shift);
+    collapseAll(mesh, lattice.shift, *sink(recorder));
 }
 
 }  // namespace pietra::pmesh

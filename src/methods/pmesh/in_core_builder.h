@@ -5,8 +5,12 @@
 // The output depends on the mesh alone. Memory: kBuildBytes a triangle; MemoryError if the budget
 // has less. Time: about two microseconds a triangle on one core.
 
+#include <functional>
+#include <memory>
+
 #include "base/budget.h"
 #include "methods/pmesh/encoder.h"
+#include "simplify/collapse_sink.h"
 
 namespace pietra::pmesh {
 
@@ -16,5 +20,10 @@ inline constexpr size_t kBuildBytes = 800;
 /// of 2^lattice.shift; its edge classes are set here.
 NodeForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
                        BuildCounts* counts = nullptr);
+
+/// The simplification alone: `sink` makes who is told in the recorder's place, and tells it.
+void collapseInCore(
+    Mesh mesh, const Lattice& lattice, Budget& budget,
+    const std::function<std::unique_ptr<CollapseSink>(Recorder& recorder)>& sink);
 
 }  // namespace pietra::pmesh

@@ -69,12 +69,11 @@ struct NodeOperation {
     std::array<std::array<int8_t, 3>, 2> delta{};
     std::array<uint16_t, 2> normal{};
     uint8_t shift = 0;
-    NormalBox normals;
-    std::array<uint8_t, 2> unused{};
+    uint8_t unused = 0;
     bool isDummy() const { return ranks == Operation::kDummyRanks; }
     bool operator==(const NodeOperation&) const = default;
 };
-static_assert(sizeof(NodeOperation) == 24);
+static_assert(sizeof(NodeOperation) == 20);
 
 /// A node as its page is decoded.
 struct OperationNode {
