@@ -103,12 +103,14 @@ float Deviation::run(const DeviationInput& in, FaceBounds& bounds) {
     CHECK_EQ(old.from_original.size(), in.before->triangle.size());
     bounds.to_original.assign(in.after->triangle.size(), 0.0f);
     bounds.from_original.assign(in.after->triangle.size(), 0.0f);
+    CHECK(in.before_takes <= in.before->triangle.size() &&
+          in.after_takes <= in.after->triangle.size());
+    std::fill_n(bounds.to_original.rbegin(), in.after_takes, -1.0f);
     s.before.assign(*in.before);
     s.after.assign(*in.after);
     s.findKept(in, bounds);
     Progressing progress{in.child_error, 0};
     s.direction.begin(s.before, s.after, old.to_original, {}, bounds.to_original, true);
-    CHECK(in.before_takes <= s.before.faceCount() && in.after_takes <= s.after.faceCount());
     for (uint32_t t = 0; t < s.before.faceCount() - in.before_takes; ++t) {
         if (!s.kept_old[t]) s.direction.cover(t, s.startForOld(in, t), progress);
     }

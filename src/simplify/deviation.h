@@ -48,7 +48,8 @@ struct DeviationInput {
                                                 ///< that was mapped to it (checked); may be empty
     float child_error = 0;  ///< largest error stated by the children: what stays well below it is
                             ///< accepted without effort
-    /// So many of the last faces of either mesh only take pieces: nothing covers them here.
+    /// So many of the last faces of either mesh only take pieces: nothing covers them here. A of
+    /// such a new face is negative if it took none.
     uint32_t before_takes = 0, after_takes = 0;
 };
 

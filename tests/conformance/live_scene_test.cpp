@@ -242,6 +242,29 @@ TEST_P(LiveScene, onlyBacksOfClosedPartsAreLeftOut) {
     EXPECT_GT(left_out, of_closed / 50);
 }
 
+/// With a triangle less nothing is closed, and all the same else.
+TEST_P(LiveScene, refinesBacksLessOnlyWhereNobodySeesThem) {
+    ConformanceMesh open = closedMesh(60);
+    open.triangles.pop_back();
+    buildModel(method(), open, scratch_, "open");
+    std::map<std::string, std::array<size_t, 2>> triangles;
+    for (const char* name : {"closed", "open"}) {
+        const ModelReader reader(scratch_.file(name));
+        for (const size_t inside : {0u, 1u}) {
+            Camera camera;
+            camera.target = {0.1, 0.2, 0};
+            camera.eye = Vec3d(inside ? 20 : 120) * Vec3d(0.4, -0.5, 0.8);
+            const std::unique_ptr<LiveModel> model = openLive(reader, openLive);
+            (void)settle(reader, *model, View(camera, kSize, reader.info().lattice), 0.25,
+                         size_t(1) << 30);
+            for (const LiveChunk& chunk : model->chunks())
+                triangles[name][inside] += chunk.mesh.triangleCount();
+        }
+    }
+    EXPECT_LT(triangles["closed"][0], triangles["open"][0] * 9 / 10);
+    EXPECT_GT(triangles["closed"][1], triangles["open"][1] * 19 / 20);
+}
+
 /// From a budget that holds little more than the coarsest mesh to more than all.
 TEST_P(LiveScene, everyFrameIsOneMeshInAnyBudget) {
     for (const char* name : {"closed", "bordered"}) {

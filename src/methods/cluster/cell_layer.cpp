@@ -159,17 +159,28 @@ CellLayer joinLayers(std::span<const CellLayer> below, int layer, const Interfac
         out.error = std::max(out.error, child.error);
         out.closed = out.closed && child.closed;
     }
-    if (below.size() > 1) stitch(to);
-    const auto isShared = [&](uint32_t number) { return table.cellsAt(number, layer).count > 1; };
-    for (uint32_t v = 0; v < own; ++v)
-        if (to.interface_[v]) to.interface_[v] = isShared(table.find(to.position[v]));
-    markIrregular(to);
+    stitch(to);
     for (const CellLayer& child : below)
-        for (const auto& [a, b] : child.joined)
-            if (isShared(a) && isShared(b)) out.joined.push_back({a, b});
+        out.joined.insert(out.joined.end(), child.joined.begin(), child.joined.end());
     std::sort(out.joined.begin(), out.joined.end());
     out.joined.erase(std::unique(out.joined.begin(), out.joined.end()), out.joined.end());
+    continueLayer(out, layer, table);
     return out;
+}
+
+void continueLayer(CellLayer& cell, int layer, const InterfaceTable& table) {
+    const auto isShared = [&](uint32_t number) { return table.cellsAt(number, layer).count > 1; };
+    PolygonMesh& polygons = cell.polygons;
+    bool changed = false;
+    for (uint32_t v = 0; v < polygons.vertexCount(); ++v)
+        if (polygons.interface_[v] && !isShared(table.find(polygons.position[v]))) {
+            polygons.interface_[v] = 0;
+            changed = true;
+        }
+    if (!changed) return;
+    markIrregular(polygons);
+    std::erase_if(cell.joined,
+                  [&](const Pair& pair) { return !isShared(pair[0]) || !isShared(pair[1]); });
 }
 
 CellLayer carryOver(const CellLayer& below, PolygonMesh polygons, LayerTriangles triangles) {

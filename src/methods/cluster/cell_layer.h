@@ -32,6 +32,8 @@ CellLayer firstLayer(const CellMesh& leaf, float error, CellId cell, const Octre
 /// What a cell's next layer begins with: the layers of its children, or its own. What no other cell
 /// uses in `layer`, the next one, is no interface any more.
 CellLayer joinLayers(std::span<const CellLayer> below, int layer, const InterfaceTable& table);
+/// The same of one, which becomes it.
+void continueLayer(CellLayer& cell, int layer, const InterfaceTable& table);
 
 /// The polygons of the next layer and their triangles, named for `below`, get names of their own
 /// and what vertices carry. Bounds, error and `joined` are not set.

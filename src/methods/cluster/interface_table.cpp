@@ -226,14 +226,32 @@ void Removals::choose() {
         for (; at != conflicts_.end() && (*at)[0] == v; ++at) blocked[(*at)[1]] = 1;
         blocked[outline_[v][0].before] = blocked[outline_[v][0].after] = 1;
         removed_[v] = 1;
-        ++count_;
+        list_.push_back(v);
     }
     conflicts_ = {};
+    std::sort(list_.begin(), list_.end());
+    strip_bounds_.resize(list_.size());
+    for (const uint32_t v : list_)
+        for (const CellId cell : table_.cellsAt(v, layer_).cell)
+            list_of_cells_.push_back({cell, v});
+    std::sort(list_of_cells_.begin(), list_of_cells_.end());
 }
 
 std::array<uint32_t, 2> Removals::neighbours(uint32_t vertex, CellId cell) const {
-    const Outline& outline = outline_[vertex][table_.cellsAt(vertex, layer_).cell[1] == cell];
+    const Outline& outline = outline_[vertex][sideOf(vertex, cell)];
     return {outline.before, outline.after};
+}
+
+std::vector<uint32_t> Removals::removedFrom(CellId cell) const {
+    std::vector<uint32_t> removed;
+    auto at = std::lower_bound(list_of_cells_.begin(), list_of_cells_.end(), std::pair(cell, 0u));
+    for (; at != list_of_cells_.end() && at->first == cell; ++at) removed.push_back(at->second);
+    return removed;
+}
+
+Removals::StripBounds& Removals::boundsOf(uint32_t vertex) {
+    const auto at = std::lower_bound(list_.begin(), list_.end(), vertex);
+    return strip_bounds_[size_t(at - list_.begin())];
 }
 
 CellId Removals::otherCell(uint32_t vertex, CellId cell) const {

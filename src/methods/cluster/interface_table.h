@@ -8,6 +8,7 @@
 // cube are one range of it. Memory: 12 bytes a vertex and 4 a use, for the whole construction; some
 // 20 a vertex and what can be removed of it for one layer; all from the budget.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <mutex>
@@ -60,11 +61,34 @@ public:
     void choose();
 
     bool isRemoved(uint32_t vertex) const { return removed_[vertex] != 0; }
-    size_t count() const { return count_; }
+    size_t count() const { return list_.size(); }
     /// Of a removed vertex: its neighbours as they follow in the outline of the cell, one of two.
     std::array<uint32_t, 2> neighbours(uint32_t vertex, CellId cell) const;
     /// The other of the two.
     CellId otherCell(uint32_t vertex, CellId cell) const;
+
+    /// What has left the cell's interfaces, in increasing order.
+    std::vector<uint32_t> removedFrom(CellId cell) const;
+    /// What the two cells of a removed vertex tell each other of its strip (StripsOfCell).
+    /// Different ones at once.
+    struct StripBounds {
+        std::array<float, 2> by{};  ///< of its distance to layer 0, by what either has below
+        float given = 0;            ///< of the distance of what was given to it
+        float strip() const { return std::min(by[0], by[1]); }
+    };
+    StripBounds& boundsOf(uint32_t vertex);
+    const StripBounds& boundsOf(uint32_t vertex) const {
+        return const_cast<Removals*>(this)->boundsOf(vertex);
+    }
+    /// Which of the two the cell is: 0 or 1.
+    size_t sideOf(uint32_t vertex, CellId cell) const {
+        return table_.cellsAt(vertex, layer_).cell[1] == cell;
+    }
+    /// Once both have told: the one that is nearer to the strip gives it to the other.
+    bool gives(uint32_t vertex, CellId cell) const {
+        const StripBounds& bounds = boundsOf(vertex);
+        return sideOf(vertex, cell) == size_t(bounds.by[0] >= bounds.by[1]);
+    }
 
 private:
     struct Outline {
@@ -90,7 +114,9 @@ private:
     std::vector<uint8_t> pinned_, removed_;
     std::mutex mutex_;
     std::vector<std::array<uint32_t, 2>> conflicts_;
-    size_t count_ = 0;
+    std::vector<uint32_t> list_;                              // what is removed, increasing
+    std::vector<StripBounds> strip_bounds_;                   // one each
+    std::vector<std::pair<CellId, uint32_t>> list_of_cells_;  // sorted
 };
 
 }  // namespace pietra::cluster

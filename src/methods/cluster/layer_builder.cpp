@@ -157,13 +157,21 @@ private:
     bool isFirst(const CellStep& step) const {
         return step.cell == step.below[0] && octree_.firstLayer(step.cell) == layer_ - 1;
     }
-    /// What the step begins with, and the nodes of that.
+    /// What the step begins with, and if that is more than one layer, these, unless null.
     CellLayer load(const CellStep& step, Worker& worker, std::vector<CellLayer>* below) const;
     UnitResult runUnit(const Unit& unit);
-    void runStep(size_t index, UnitResult& result, std::vector<CellLayer>& patches,
+    void runStep(size_t index, UnitResult& result, std::vector<Mesh>& patches,
                  std::vector<Mesh>& joints);
+    /// The strips' triangles: before, removed, after in the cell's outline, or turned.
+    Mesh stripsOf(CellId cell, std::span<const uint32_t> removed, bool turned) const;
+    /// Of what is removed, that whose strips the cell gives, or takes. Only leaves do: in larger
+    /// cells the outline's way within the surface is little beside the rest.
+    std::vector<uint32_t> removedBy(CellId cell, bool given) const;
+    void boundStripsOf(const CellStep& step);
+    /// Of a finished layer, when all cells have told what they gave.
+    void takeStripsOf(CellId cell);
     LayerStep makeLayer(const CellStep& step, const CellLayer& base) const;
-    Mesh addJoints(const CellStep& step, const CellLayer& base, bool closed, UnitResult& result,
+    void addJoints(const CellStep& step, const CellLayer& base, UnitResult& result,
                    std::vector<Mesh>& joints, std::vector<Sphere>& balls, Worker& worker) const;
     Node leafNode(const CellStep& step, const CellLayer& layer, Worker& worker) const;
     void write(UnitResult& result);
@@ -222,6 +230,7 @@ void Builder::buildLayer() {
         progress_.tick(0);
     });
     removals_->choose();
+    parallelFor(steps_.size(), [&](size_t i) { boundStripsOf(steps_[i]); });
 
     layers_ = std::make_unique<Spill>(space_);
     states_.clear();
@@ -231,6 +240,7 @@ void Builder::buildLayer() {
     orderedPipeline(
         units.size(), size_t(settings_.jobs) * 2, [&](size_t u) { return runUnit(units[u]); },
         [&](UnitResult& result) { write(result); });
+    parallelFor(steps_.size(), [&](size_t i) { takeStripsOf(steps_[i].cell); });
     groups_ += uint32_t(steps_.size());
     below_ = std::move(states_);
     layers_below_ = std::move(layers_);
@@ -250,6 +260,10 @@ CellLayer Builder::load(const CellStep& step, Worker& worker, std::vector<CellLa
             layers_below_->read(state.position, bytes);
             layers.push_back(unpackLayer(std::move(bytes)));
         }
+    }
+    if (layers.size() == 1) {
+        continueLayer(layers[0], layer_, *table_);
+        return std::move(layers[0]);
     }
     CellLayer base = joinLayers(layers, layer_, *table_);
     if (below) *below = std::move(layers);
@@ -290,10 +304,60 @@ LayerStep Builder::makeLayer(const CellStep& step, const CellLayer& base) const 
     return next;
 }
 
+Mesh Builder::stripsOf(CellId cell, std::span<const uint32_t> removed, bool turned) const {
+    Mesh strips;
+    for (const uint32_t v : removed) {
+        const auto [before, after] = removals_->neighbours(v, cell);
+        const uint32_t base = uint32_t(strips.position.size());
+        for (const uint32_t corner : {turned ? after : before, v, turned ? before : after})
+            strips.position.push_back(table_->positionOf(corner));
+        strips.triangle.push_back({base, base + 1, base + 2});
+    }
+    return strips;
+}
+
+std::vector<uint32_t> Builder::removedBy(CellId cell, bool given) const {
+    std::vector<uint32_t> removed = removals_->removedFrom(cell);
+    std::erase_if(removed, [&](uint32_t v) {
+        return removals_->gives(v, cell) != given || !octree_.isLeaf(cell) ||
+               !octree_.isLeaf(removals_->otherCell(v, cell));
+    });
+    return removed;
+}
+
+void Builder::boundStripsOf(const CellStep& step) {
+    const std::vector<uint32_t> removed = removals_->removedFrom(step.cell);
+    if (removed.empty()) return;
+    const CellLayer base = load(step, workers_.local(), nullptr);
+    const std::vector<float> bounds = boundStrips(stripsOf(step.cell, removed, false),
+                                                  base.triangles.mesh, base.error, base.bounds);
+    for (size_t i = 0; i < removed.size(); ++i)
+        removals_->boundsOf(removed[i]).by[removals_->sideOf(removed[i], step.cell)] = bounds[i];
+    progress_.tick(0);
+}
+
+void Builder::takeStripsOf(CellId cell) {
+    const std::vector<uint32_t> removed = removedBy(cell, false);
+    if (removed.empty()) return;
+    CellState& state = states_.at(cell);
+    std::vector<std::byte> bytes(state.bytes);
+    layers_->read(state.position, bytes);
+    CellLayer layer = unpackLayer(std::move(bytes));
+    std::vector<float> given;
+    for (const uint32_t v : removed) given.push_back(removals_->boundsOf(v).given);
+    layer.error = takeStrips(stripsOf(cell, removed, true), given, layer.triangles.mesh,
+                             layer.error, layer.bounds);
+    for (const float bound : given) layer.error = std::max(layer.error, bound);
+    state.node.error = layer.error;
+    bytes = packLayer(layer);
+    CHECK_EQ(bytes.size(), state.bytes);
+    layers_->write(state.position, bytes);
+}
+
 /// The strips of this cell, for where it is below the layer and the other cell is not: a joint for
-/// each other cell. Returns all strips.
-Mesh Builder::addJoints(const CellStep& step, const CellLayer& base, bool closed,
-                        UnitResult& result, std::vector<Mesh>& joints, std::vector<Sphere>& balls,
+/// each other cell.
+void Builder::addJoints(const CellStep& step, const CellLayer& base, UnitResult& result,
+                        std::vector<Mesh>& joints, std::vector<Sphere>& balls,
                         Worker& worker) const {
     const PolygonMesh& polygons = base.polygons;
     std::unordered_map<uint32_t, uint32_t> vertex_of;  // by number in the table
@@ -305,7 +369,6 @@ Mesh Builder::addJoints(const CellStep& step, const CellLayer& base, bool closed
         if (removals_->isRemoved(number))
             removed[removals_->otherCell(number, step.cell)].push_back(number);
     }
-    Mesh strips;
     for (auto& [other, numbers] : removed) {
         std::sort(numbers.begin(), numbers.end());
         Mesh joint;
@@ -319,14 +382,11 @@ Mesh Builder::addJoints(const CellStep& step, const CellLayer& base, bool closed
                 const uint32_t v = vertex_of.at(k == 0 ? before : k == 1 ? after : number);
                 triangle[k] = joiner.addVertex(base.triangles.mesh, v);
                 points.push_back(polygons.position[v]);
-                strips.position.push_back(polygons.position[v]);
             }
             joint.triangle.push_back(triangle);
             joint.edge_class.push_back(0);
-            const uint32_t end = uint32_t(strips.position.size());
-            strips.triangle.push_back({end - 3, end - 2, end - 1});
         }
-        Node node = describe(joint, closed, worker);
+        Node node = describe(joint, base.closed, worker);
         // The same for both sides.
         std::sort(points.begin(), points.end(),
                   [](const Vec3i& a, const Vec3i& b) { return latticeKey(a) < latticeKey(b); });
@@ -343,35 +403,44 @@ Mesh Builder::addJoints(const CellStep& step, const CellLayer& base, bool closed
         result.nodes.push_back(node);
         joints.push_back(std::move(joint));
     }
-    return strips;
 }
 
-void Builder::runStep(size_t index, UnitResult& result, std::vector<CellLayer>& patches,
+void Builder::runStep(size_t index, UnitResult& result, std::vector<Mesh>& patches,
                       std::vector<Mesh>& joints) {
     const CellStep& step = steps_[index];
     Worker& worker = workers_.local();
     std::vector<CellLayer> below;
-    const CellLayer base = load(step, worker, &below);
+    CellLayer base = load(step, worker, &below);
     const NodeIndex first = NodeIndex(result.nodes.size());
     std::vector<Sphere> spheres;
-    for (size_t c = 0; c < below.size(); ++c) {
-        result.nodes.push_back(isFirst(step) ? leafNode(step, below[c], worker)
-                                             : below_.at(step.below[c]).node);
+    for (const CellId cell : step.below) {
+        result.nodes.push_back(isFirst(step) ? leafNode(step, base, worker) : below_.at(cell).node);
         spheres.push_back(result.nodes.back().saturated);
     }
     const float error = base.error;
-    const Mesh strips = addJoints(step, base, base.closed, result, joints, spheres, worker);
-    const std::vector<float> strip_bounds =
-        boundStrips(strips, base.triangles.mesh, error, base.bounds);
+    addJoints(step, base, result, joints, spheres, worker);
     LayerStep next = makeLayer(step, base);
+    StripsOfCell strips;
+    const std::vector<uint32_t> given = removedBy(step.cell, true);
+    const std::vector<uint32_t> taken = removedBy(step.cell, false);
+    strips.given = stripsOf(step.cell, given, false);
+    strips.taken = stripsOf(step.cell, taken, true);
+    for (const uint32_t v : taken) strips.taken_bound.push_back(removals_->boundsOf(v).strip());
     FaceBounds bounds = base.bounds;
-    const float bound = boundLayer(base.triangles.mesh, error, next.triangles.mesh,
-                                   next.triangle_map, worker.deviation, bounds);
+    std::vector<float> given_bound;
+    float bound = boundLayer(base.triangles.mesh, error, next.triangles.mesh, next.triangle_map,
+                             strips, worker.deviation, bounds, given_bound);
+    for (const uint32_t v : removals_->removedFrom(step.cell))
+        bound = std::max(bound, removals_->boundsOf(v).strip());
+    for (size_t i = 0; i < given.size(); ++i) {
+        Removals::StripBounds& told = removals_->boundsOf(given[i]);
+        told.given = given_bound[i];
+        bound = std::max(bound, told.given);
+    }
     CellLayer layer = carryOver(base, std::move(next.polygons), std::move(next.triangles));
     layer.bounds = std::move(bounds);
     layer.joined = base.joined;
     layer.error = bound;
-    for (const float b : strip_bounds) layer.error = std::max(layer.error, b);
 
     Finished done{step.cell, {}};
     Node& node = done.state.node;
@@ -388,17 +457,17 @@ void Builder::runStep(size_t index, UnitResult& result, std::vector<CellLayer>& 
     done.state.bytes = packed.size();
     result.finished.push_back(done);
     result.triangles += base.triangles.mesh.triangleCount();
-    for (CellLayer& one : below) patches.push_back(std::move(one));
+    if (below.empty()) patches.push_back(std::move(base.triangles.mesh));
+    for (CellLayer& one : below) patches.push_back(std::move(one.triangles.mesh));
 }
 
 UnitResult Builder::runUnit(const Unit& unit) {
     UnitResult result;
-    std::vector<std::vector<CellLayer>> patches(unit.end - unit.first);
-    std::vector<std::vector<Mesh>> joints(unit.end - unit.first);
+    std::vector<std::vector<Mesh>> patches(unit.end - unit.first), joints(patches.size());
     std::vector<const Mesh*> meshes;
     for (size_t i = 0; i < patches.size(); ++i) {
         runStep(unit.first + i, result, patches[i], joints[i]);
-        for (const CellLayer& layer : patches[i]) meshes.push_back(&layer.triangles.mesh);
+        for (const Mesh& patch : patches[i]) meshes.push_back(&patch);
         for (const Mesh& joint : joints[i]) meshes.push_back(&joint);
     }
     result.page = encodePage(meshes, page_settings_);

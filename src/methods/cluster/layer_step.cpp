@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
+#include <unordered_map>
 
 #include "geometry/lattice.h"
 #include "methods/cluster/anchors.h"
@@ -13,6 +13,10 @@
 namespace pietra::cluster {
 
 namespace {
+
+/// A strip to which more than this part of the layer's bound is given, and more than its height, is
+/// not worth its cost to who takes it.
+constexpr float kSmallPart = 0.25f;
 
 /// How often polygons that fold over get a vertex back.
 constexpr int kUnfoldingRounds = 2;
@@ -91,15 +95,15 @@ Mesh withStrips(const Mesh& mesh, const Mesh& strips) {
     Mesh whole;
     whole.position = mesh.position;
     whole.triangle = mesh.triangle;
-    std::map<uint64_t, uint32_t> vertex;
-    for (const Vec3i& p : strips.position) vertex[latticeKey(p)] = kNone;
+    std::unordered_map<uint64_t, uint32_t> vertex;
+    for (const Vec3i& p : strips.position) vertex.emplace(latticeKey(p), kNone);
     for (uint32_t v = 0; v < mesh.vertexCount() && !vertex.empty(); ++v)
         if (const auto at = vertex.find(latticeKey(mesh.position[v])); at != vertex.end())
             at->second = v;
     for (Triangle triangle : strips.triangle) {
         for (uint32_t& corner : triangle) {
             const Vec3i& p = strips.position[corner];
-            uint32_t& v = vertex[latticeKey(p)];
+            uint32_t& v = vertex.at(latticeKey(p));
             if (v == kNone) {
                 v = uint32_t(whole.position.size());
                 whole.position.push_back(p);
@@ -109,6 +113,14 @@ Mesh withStrips(const Mesh& mesh, const Mesh& strips) {
         whole.triangle.push_back(triangle);
     }
     return whole;
+}
+
+/// How far a strip's removed vertex lies off the other two; given strips.
+float heightOf(const Mesh& strips, size_t i) {
+    const Triangle& t = strips.triangle[i];
+    const Vec3d a(strips.position[t[0]]), edge = Vec3d(strips.position[t[2]]) - a;
+    const Vec3d across = glm::cross(edge, Vec3d(strips.position[t[1]]) - a);
+    return float(std::sqrt(glm::dot(across, across) / glm::dot(edge, edge)));
 }
 
 /// Covers `strips` by faces of `target`, looking first where that is nearest.
@@ -140,33 +152,61 @@ float boundLayer(const Mesh& below, float error, const Mesh& layer,
 float boundLayer(const Mesh& below, float error, const Mesh& layer,
                  std::span<const uint32_t> triangle_map, const StripsOfCell& strips,
                  Deviation& deviation, FaceBounds& bounds, std::vector<float>& given_bound) {
-    const Mesh before = withStrips(below, strips.taken), after = withStrips(layer, strips.given);
-    bounds.to_original.resize(before.triangleCount(), 0);
-    for (const float bound : strips.taken_bound) bounds.from_original.push_back(bound);
+    const Mesh before = withStrips(below, strips.taken);
+    FaceBounds before_bounds = std::move(bounds);
+    before_bounds.to_original.resize(before.triangleCount(), 0);
+    for (const float bound : strips.taken_bound) before_bounds.from_original.push_back(bound);
     DeviationInput step;
     step.before = &before;
-    step.before_bounds = &bounds;
-    step.after = &after;
+    step.before_bounds = &before_bounds;
     step.triangle_map = triangle_map;
     const std::vector<uint8_t> changed = changedTriangles(below, layer, triangle_map);
     step.triangle_changed = changed;
     step.child_error = error;
     step.before_takes = uint32_t(strips.taken.triangleCount());
-    step.after_takes = uint32_t(strips.given.triangleCount());
-    FaceBounds result;
-    deviation.run(step, result);
-    const auto first_given = result.to_original.begin() + ptrdiff_t(layer.triangleCount());
-    given_bound.assign(first_given, result.to_original.end());
-    result.to_original.erase(first_given, result.to_original.end());
-    result.from_original.resize(layer.triangleCount());
-    bounds = std::move(result);
-    return largestOf(bounds, error);
+    given_bound.assign(strips.given.triangleCount(), -1);
+    // Whatever a strip saves is no more than its height.
+    std::vector<size_t> given;
+    for (size_t i = 0; i < given_bound.size(); ++i)
+        if (heightOf(strips.given, i) > error) given.push_back(i);
+    for (;;) {
+        Mesh offered;
+        offered.position = strips.given.position;
+        for (const size_t i : given) offered.triangle.push_back(strips.given.triangle[i]);
+        const Mesh after = withStrips(layer, offered);
+        step.after = &after;
+        step.after_takes = uint32_t(given.size());
+        deviation.run(step, bounds);
+        const std::vector<float> value(
+            bounds.to_original.begin() + ptrdiff_t(layer.triangleCount()),
+            bounds.to_original.end());
+        bounds.to_original.resize(layer.triangleCount());
+        bounds.from_original.resize(layer.triangleCount());
+        const float result = largestOf(bounds, error);
+        std::vector<size_t> worth;
+        for (size_t i = 0; i < given.size(); ++i)
+            if (value[i] <= std::max(kSmallPart * result, heightOf(strips.given, given[i])))
+                worth.push_back(given[i]);
+        if (worth.size() == given.size()) {
+            for (size_t i = 0; i < given.size(); ++i) given_bound[given[i]] = value[i];
+            return result;
+        }
+        given = std::move(worth);
+    }
 }
 
 float takeStrips(const Mesh& taken, std::span<const float> given_bound, const Mesh& layer,
                  float error, FaceBounds& bounds) {
-    if (taken.triangle.empty()) return error;
-    coverStrips(taken, layer, given_bound, {}, error, bounds.to_original, true);
+    Mesh strips;
+    std::vector<float> base;
+    for (size_t i = 0; i < given_bound.size(); ++i) {
+        if (given_bound[i] < 0) continue;
+        strips.triangle.push_back(taken.triangle[i]);
+        base.push_back(given_bound[i]);
+    }
+    if (base.empty()) return error;
+    strips.position = taken.position;
+    coverStrips(strips, layer, base, {}, error, bounds.to_original, true);
     return largestOf(bounds, error);
 }
 

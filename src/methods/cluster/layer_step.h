@@ -40,7 +40,8 @@ struct StripsOfCell {
 /// Of a layer above `below`: an upper bound of its distance to layer 0, both ways, at least
 /// `error`, that of `below`. `bounds`: of the triangles of `below`, then of the layer's. With
 /// strips, what is near those given is theirs: `given_bound` becomes a bound of its distance from
-/// each. What the cell takes is missing in its bounds until takeStrips().
+/// each, negative where nothing is. What the cell takes is missing in its bounds until
+/// takeStrips().
 float boundLayer(const Mesh& below, float error, const Mesh& layer,
                  std::span<const uint32_t> triangle_map, Deviation& deviation, FaceBounds& bounds);
 float boundLayer(const Mesh& below, float error, const Mesh& layer,

@@ -185,7 +185,7 @@ LayeredPiece buildLayers(const Mesh& mesh, const CellTriangles& cells,
             }
         spend(piece.seconds.faces);
         std::vector<ListedStrips> own(count);
-        std::vector<float> given(strips.size(), 0);
+        std::vector<float> given(strips.size(), -1);
         parallelFor(count, [&](size_t c) {
             CellLayers& cell = piece.cell[c];
             own[c] = stripsOf(piece, strips, uint32_t(c), strip_bound);

@@ -6,16 +6,28 @@
 
 namespace pietra::cluster {
 
+namespace {
+
+bool comesBefore(CellId a, CellId b) {
+    return firstPath(a) < firstPath(b);
+}
+
+}  // namespace
+
 Octree::Octree(std::vector<CellId> leaves) : leaves_(std::move(leaves)) {
     for (const CellId leaf : leaves_) deepest_ = std::max(deepest_, depthOf(leaf));
 }
 
+bool Octree::isLeaf(CellId cell) const {
+    if (cell == 1) return false;
+    const auto at = std::lower_bound(leaves_.begin(), leaves_.end(), cell, comesBefore);
+    return at != leaves_.end() && *at == cell;
+}
+
 size_t Octree::leafNumber(CellId cell) const {
-    const auto at = std::lower_bound(leaves_.begin(), leaves_.end(), cell, [](CellId a, CellId b) {
-        return firstPath(a) < firstPath(b);
-    });
-    CHECK(at != leaves_.end() && *at == cell);
-    return size_t(at - leaves_.begin());
+    CHECK(isLeaf(cell));
+    return size_t(std::lower_bound(leaves_.begin(), leaves_.end(), cell, comesBefore) -
+                  leaves_.begin());
 }
 
 std::vector<CellStep> Octree::stepsOf(int layer) const {

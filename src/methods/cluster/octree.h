@@ -32,6 +32,7 @@ public:
 
     const std::vector<CellId>& leaves() const { return leaves_; }
     int topLayer() const { return deepest_ + kLocalLayers; }
+    bool isLeaf(CellId cell) const;
     /// The leaf's number; it must be one.
     size_t leafNumber(CellId cell) const;
     /// The number of the leaf's first layer.

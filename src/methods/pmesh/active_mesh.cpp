@@ -104,6 +104,7 @@ void ActiveMesh::setNext(uint32_t v, OperationId next) {
     if (next == kNoOperation) {
         pulse[v].next_level = uint16_t(kLeafLevel);
         criteria[v].split_radius = criteria[v].split_error = 0;
+        criteria[v].split_normals = 0;
     } else if (source_->isLoaded(next)) {
         pulse[v].next_level = source_->at(next).level;
         updateCriteria(v);
@@ -115,6 +116,8 @@ void ActiveMesh::setNext(uint32_t v, OperationId next) {
         pulse[v].next_level = reference.level;
         criteria[v].split_radius = uint16_t(encodeRoundedUp<11>(radius));
         criteria[v].split_error = reference.error;
+        // The operation that it hangs below encloses it.
+        criteria[v].split_normals = source_->at(record[v].last).normals.word();
         record[v].provisional = 1;
     }
 }
@@ -123,6 +126,7 @@ void ActiveMesh::updateCriteria(uint32_t v) {
     const Operation& o = source_->at(record[v].next);
     criteria[v].split_radius = o.radius;
     criteria[v].split_error = o.error;
+    criteria[v].split_normals = o.normals.word();
     record[v].provisional = 0;
 }
 
@@ -130,6 +134,7 @@ void ActiveMesh::setLast(uint32_t v, OperationId last) {
     record[v].last = last;
     criteria[v].merge_radius = VertexCriteria::kEverNeeded;
     criteria[v].merge_error = 0;
+    criteria[v].merge_normals = 0;
     pulse[v].last_level = 0;
     if (last == kNoOperation) return;
     const Operation& o = source_->at(last);
@@ -137,6 +142,7 @@ void ActiveMesh::setLast(uint32_t v, OperationId last) {
     if (!canUndo(v)) return;
     criteria[v].merge_radius = radiusAroundU(o);
     criteria[v].merge_error = o.error;
+    criteria[v].merge_normals = o.normals.word();
 }
 
 bool ActiveMesh::orient(Star& star) const {

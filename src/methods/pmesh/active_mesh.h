@@ -70,16 +70,18 @@ struct alignas(16) VertexRecord {
     static constexpr uint16_t kRefused = 2;  ///< its split does not fit its star: it never splits
 };
 
-/// The spheres and errors that a scan for work compares (criterion.h): those of the next split,
-/// around the vertex, and, where canUndo(), those of the last one; there the sphere is a smaller
-/// one around u, which tells in haste that nothing is to do.
+/// The spheres, errors and normals that a scan for work compares (criterion.h): those of the next
+/// split, around the vertex, and, where canUndo(), those of the last one; there the sphere is a
+/// smaller one around u, which tells in haste that nothing is to do.
 struct VertexCriteria {
     uint16_t split_radius = 0;
     uint8_t split_error = 0;
     uint8_t unused = 0;
+    uint32_t split_normals = 0;  ///< NormalBox::word()
     uint16_t merge_radius = kEverNeeded;
     uint8_t merge_error = 0;
     uint8_t unused_too = 0;
+    uint32_t merge_normals = 0;
     static constexpr uint16_t kEverNeeded = 0x7fff;  ///< beyond all distances
     /// Added to merge_radius: a neighbour hinders the merge, whatever the view.
     static constexpr uint16_t kBlocked = 0x8000;

@@ -219,7 +219,7 @@ bool Adaption::isNeeded(uint32_t u) const {
     if (criterion_.needsLast(mesh_.vertex[u], mesh_.criteria[u])) return true;
     const Operation& o = mesh_.source().at(mesh_.record[u].last);
     return criterion_.needs(mesh_.vertex[u].position() - o.offset(o.isDummy() ? 0 : 1), o.error,
-                            o.radius);
+                            o.radius, o.normals.word());
 }
 
 bool Adaption::anyMarkedAround(uint32_t v) const {

@@ -53,7 +53,7 @@ struct Reference {
         for (size_t i = order.size(); i-- > 0;) {
             const OperationId o = order[i];
             const Operation& op = source.operation[o];
-            in[o] |= criterion.needs(centre[o], op.error, op.radius);
+            in[o] |= criterion.needs(centre[o], op.error, op.radius, op.normals.word());
             if (in[o])
                 for (const OperationId d : needs[o]) in[d] = 1;
         }
@@ -81,6 +81,7 @@ TEST_P(Adapted, IsTheClosureOfWhatIsNeededWhateverWasBefore) {
     for (int i = 0; i < 12; ++i) {
         Criterion view = randomView(random, built.input);
         if (i % 2 == 0) view.occlusion = randomOcclusion(random, built.input);
+        view.hides_backs = i % 4 >= 2;
         coarse.settle(nothing());
         fine.settle(everything());
         for (Adaption* adaption : {&walker, &coarse, &fine}) {
@@ -120,14 +121,69 @@ TEST_P(Adapted, AHundredCyclesLeaveTheBaseBitForBit) {
     EXPECT_EQ(adaption.mesh().face, base.face);
 }
 
+NormalBox randomBox(std::mt19937& random) {
+    std::normal_distribution<double> any, near(0, 0.3);
+    const Vec3d middle(any(random), any(random), any(random));
+    NormalBox box = NormalBox::none();
+    for (uint32_t i = 0; i < 1 + random() % 3; ++i)
+        box.add(middle + Vec3d(near(random), near(random), near(random)));
+    return box;
+}
+
+/// What is said to face away does, from all points of the sphere, whatever the normal of the box.
+TEST(Criterion, FacesAwayOnlyIfAllDo) {
+    std::mt19937 random(18);
+    std::normal_distribution<double> any;
+    uint32_t away = 0;
+    for (int i = 0; i < 20000; ++i) {
+        const auto radius = int64_t(random() % 300);
+        const Vec3d to_sphere = 400.0 * Vec3d(any(random), any(random), any(random));
+        const Vec3l d(to_sphere);
+        NormalBox box = NormalBox::none();
+        std::vector<Vec3d> normals;
+        for (uint32_t j = 0; j < 1 + random() % 4; ++j) {
+            normals.push_back(
+                glm::normalize(to_sphere + 300.0 * Vec3d(any(random), any(random), any(random))));
+            box.add(normals.back());
+        }
+        if (!Criterion::facesAway(d, radius, box.word())) continue;
+        ++away;
+        for (const Vec3d& n : normals) EXPECT_GT(glm::dot(n, Vec3d(d) - double(radius) * n), 0);
+    }
+    EXPECT_GT(away, 2000u);
+}
+
+/// Nor does a sphere within one that faces away show its front, be it at the rim where the box's
+/// longest normal points.
+TEST(Criterion, FacesAwayWithAllThatIsWithin) {
+    std::mt19937 random(19);
+    std::normal_distribution<double> any;
+    uint32_t away = 0;
+    for (int i = 0; i < 20000; ++i) {
+        const Vec3l d(3000.0 * Vec3d(any(random), any(random), any(random)));
+        const NormalBox box = randomBox(random);
+        Vec3d nearest;
+        for (int k = 0; k < 3; ++k)
+            nearest[k] = d[k] > 0 ? box.low(size_t(k)) : box.high(size_t(k));
+        int64_t radius = 0;
+        while (Criterion::facesAway(d, radius + 8, box.word())) radius += 8;
+        if (radius < 64) continue;
+        ++away;
+        const Vec3l to_rim(-double(radius) * glm::normalize(nearest));
+        EXPECT_TRUE(Criterion::facesAway(d + to_rim, 0, box.word()));
+    }
+    EXPECT_GT(away, 1000u);
+}
+
 TEST(Criterion, NeedsNoSphereWithinOneThatItDoesNotNeed) {
     const Mesh mesh = onLattice(test::sphereShape(8), 1 << 14);
     std::mt19937 random(16);
     const auto below = [&](uint32_t limit) { return int32_t(random() % limit); };
-    uint32_t inner_needed = 0, outer_only = 0, hidden = 0;
+    uint32_t inner_needed = 0, outer_only = 0, hidden = 0, away = 0;
     for (int i = 0; i < 400; ++i) {
         Criterion view = randomView(random, mesh);
-        const Criterion in_the_open = view;
+        Criterion in_the_open = view;
+        in_the_open.hides_backs = false;
         if (i % 2 == 0) view.occlusion = randomOcclusion(random, mesh);
         for (int j = 0; j < 500; ++j) {
             const Vec3i centre(below(1 << 14), below(1 << 14), below(1 << 14));
@@ -139,17 +195,33 @@ TEST(Criterion, NeedsNoSphereWithinOneThatItDoesNotNeed) {
             const uint32_t outer = encodeRoundedUp<11>(uint64_t(std::ceil(reach)));
             const auto error = uint32_t(1 + below(255)),
                        more = error + uint32_t(below(256 - error));
-            const bool is_needed = view.needs(centre + offset, error, inner);
-            const bool is_outer_needed = view.needs(centre, more, outer);
+            NormalBox normals = randomBox(random), around = normals;
+            if (j % 2 == 0) around.add(randomBox(random));
+            const bool is_needed = view.needs(centre + offset, error, inner, normals.word());
+            const bool is_outer_needed = view.needs(centre, more, outer, around.word());
             EXPECT_TRUE(is_outer_needed || !is_needed);
             inner_needed += is_needed;
             outer_only += is_outer_needed && !is_needed;
-            hidden += !is_needed && in_the_open.needs(centre + offset, error, inner);
+            if (is_needed || !in_the_open.needs(centre + offset, error, inner, 0)) continue;
+            ++(view.occlusion ? hidden : away);
         }
     }
     EXPECT_GT(hidden, 500u);
+    EXPECT_GT(away, 500u);
     EXPECT_GT(inner_needed, 1000u);
     EXPECT_GT(outer_only, 1000u);
+}
+
+/// So that the sphere's edge is as close to facing away as may be.
+void setAcross(VertexCriteria& c, const Vec3i& d) {
+    const NormalBox box = NormalBox::ofBits(c.split_normals);
+    int64_t along = 0;
+    for (int k = 0; k < 3; ++k)
+        along += std::min<int64_t>(int64_t(box.low(size_t(k))) * d[k],
+                                   int64_t(box.high(size_t(k))) * d[k]);
+    if (along > 0)
+        c.split_radius = uint16_t(std::min(
+            encodeRoundedUp<11>(uint64_t(2 * along / (c.split_normals >> 24))), kMaxRadiusCode));
 }
 
 TEST(Criterion, DecidesTheSameOfManyVerticesAtOnce) {
@@ -175,6 +247,9 @@ TEST(Criterion, DecidesTheSameOfManyVerticesAtOnce) {
             if (random() % 8 == 0) c.merge_radius |= VertexCriteria::kBlocked;
             c.split_error = error;
             c.merge_error = uint8_t(random());
+            c.split_normals = randomBox(random).word();
+            c.merge_normals = randomBox(random).word();
+            if (random() % 2) setAcross(c, p - view.eye);
         }
         const size_t count = 1 + random() % 64;
         const ScanBits bits = scanVertices(view, vertex.data(), criteria.data(), count);
@@ -204,7 +279,7 @@ TEST(Criterion, OfAPictureIsTheSameWithinItAndNeedsLessOutside) {
     const auto reachOf = [](const Criterion& c, const Vec3d& direction) {
         int32_t far = 0;
         for (int32_t step = 1 << 20; step > 0; step /= 2)
-            if (c.needs(Vec3i(direction * double(far + step)), 100, 10)) far += step;
+            if (c.needs(Vec3i(direction * double(far + step)), 100, 10, 0)) far += step;
         return far;
     };
     const double edge = std::tan(22.5 / 180 * 3.14159265358979);

@@ -2,12 +2,14 @@
 // Which operations a view needs: those whose error, at the point of their sphere nearest to the
 // eye, shows. Outside the picture the tolerance grows with the distance from its pyramid: a sharp
 // cut there would force long chains of splits for nothing but order. What the last picture hid has
-// a larger one, too; it is drawn all the same, and refined as soon as it comes to light.
+// a larger one, too; it is drawn all the same, and refined as soon as it comes to light. So has
+// what faces away, where backs are not seen: from all eyes as near as that in all of the sphere.
 //
 // Integers only, so every body of the adaption decides alike; and monotone in error and sphere, so
 // that what saturation ordered stays in order, also where a comparison is close: a sphere within
 // another is neither nearer to the eye nor to the pyramid, as the sides' normals are no longer than
-// one, and rounding down is monotone.
+// one, and rounding down is monotone; and a box of normals within another has no longer vectors, so
+// that it faces away by no less.
 
 #include <algorithm>
 #include <array>
@@ -36,18 +38,24 @@ struct Criterion {
 
     /// Null: nothing is hidden.
     std::shared_ptr<const Occlusion> occlusion;
-    /// What is hidden is as if 2^kHiddenBits times farther away.
+    /// The eye is outside of all closed parts, which are drawn one-sided: their backs are not seen.
+    bool hides_backs = false;
+    /// What is hidden or faces away is as if 2^kHiddenBits times farther away.
     static constexpr int kHiddenBits = 3;
 
     static constexpr int32_t kFarthestEye = 1 << 24, kFarthest = 1 << 25;
 
-    bool needs(const Vec3i& centre, uint32_t error, uint32_t radius_code) const {
+    /// `normals`: NormalBox::word().
+    bool needs(const Vec3i& centre, uint32_t error, uint32_t radius_code, uint32_t normals) const {
         const Vec3l d(centre - eye);  // below 2^25 each
         const auto radius = int64_t(decodeRounded<11>(radius_code));
         if (!shows(d, reach[error], radius)) return false;
-        if (!occlusion || shows(d, reach[error] >> kHiddenBits, radius)) return true;
+        if ((!occlusion && !hides_backs) || shows(d, reach[error] >> kHiddenBits, radius))
+            return true;
+        if (hides_backs && facesAway(d, radius, normals)) return false;
         // With the error, so that what is coarser there stays behind what hides it.
-        return !occlusion->hides(centre, radius + int64_t(decodeError(error) / 64) + 1);
+        return !occlusion ||
+               !occlusion->hides(centre, radius + int64_t(decodeError(error) / 64) + 1);
     }
     /// At the tolerance that `reach_of_error` is of.
     bool shows(const Vec3l& d, int64_t reach_of_error, int64_t radius) const {
@@ -62,13 +70,21 @@ struct Criterion {
         const int64_t rest = distance + kOutside * inside;
         return rest > 0 && rest * rest > squared;
     }
+    /// From everywhere in the sphere; sums are below 2^31.
+    static bool facesAway(const Vec3l& d, int64_t radius, uint32_t normals) {
+        const NormalBox box = NormalBox::ofBits(normals);
+        int64_t along = 0;
+        for (int k = 0; k < 3; ++k)
+            along += std::min(box.low(size_t(k)) * d[k], box.high(size_t(k)) * d[k]);
+        return 2 * along > int64_t(normals >> 24) * radius;
+    }
     bool needsSplit(const Vertex& v, const VertexCriteria& c) const {
-        return needs(v.position(), c.split_error, c.split_radius);
+        return needs(v.position(), c.split_error, c.split_radius, c.split_normals);
     }
     /// False only if the operation that the vertex came from is not needed, maybe.
     bool needsLast(const Vertex& v, const VertexCriteria& c) const {
         return c.merge_radius >= VertexCriteria::kBlocked ||
-               needs(v.position(), c.merge_error, c.merge_radius);
+               needs(v.position(), c.merge_error, c.merge_radius, c.merge_normals);
     }
 };
 

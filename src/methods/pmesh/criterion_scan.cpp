@@ -48,16 +48,51 @@ struct Scanner {
     const Criterion& criterion;
     VF x, y, z, squared;  // from the eye
 
+    struct Answer {
+        hn::Mask<F> yes, maybe;
+    };
     /// Relative errors are below 2^-20: a few roundings to 24 bits.
-    HWY_INLINE void test(const VU packed, size_t at, CertainBits& result) const {
+    HWY_INLINE Answer shows(const VF distance) const {
+        const VF above = hn::Set(F(), 1 + 0x1p-19f), limit = hn::Mul(distance, distance);
+        return {hn::Gt(limit, hn::Mul(squared, above)), hn::Ge(hn::Mul(limit, above), squared)};
+    }
+
+    /// Criterion::facesAway(), if the eye is so far off. Errors are relative to the terms, of which
+    /// each is at most 16 times a coordinate.
+    HWY_INLINE Answer facesAway(const VU normals, const VF radius) const {
+        const F f;
+        VF along = hn::Zero(f), terms = hn::Zero(f);
+        const auto add = [&](const VF d, const VU low, const VU high) {
+            const auto coordinate = [&](const VU bits) {
+                return hn::ConvertTo(f, hn::ShiftRight<28>(hn::BitCast(I(), bits)));
+            };
+            along =
+                hn::Add(along, hn::Min(hn::Mul(d, coordinate(low)), hn::Mul(d, coordinate(high))));
+            terms = hn::Add(terms, hn::Abs(d));
+        };
+        add(x, hn::ShiftLeft<28>(normals), hn::ShiftLeft<24>(normals));
+        add(y, hn::ShiftLeft<20>(normals), hn::ShiftLeft<16>(normals));
+        add(z, hn::ShiftLeft<12>(normals), hn::ShiftLeft<8>(normals));
+        const VF longest = hn::ConvertTo(f, hn::BitCast(I(), hn::ShiftRight<24>(normals)));
+        const VF beyond = hn::Sub(hn::Add(along, along), hn::Mul(longest, radius));
+        const VF margin = hn::Mul(terms, hn::Set(f, 16 * 0x1p-19f));
+        return {hn::Gt(beyond, margin), hn::Ge(beyond, hn::Neg(margin))};
+    }
+
+    HWY_INLINE void test(const VU packed, const VU normals, size_t at, CertainBits& result) const {
         const F f;
         const VF radius = radiusOf(hn::And(packed, hn::Set(U(), 0xffff)));
         const auto error = hn::BitCast(I(), hn::ShiftRight<16>(packed));
-        const VF reach = hn::ConvertTo(f, hn::GatherIndex(I(), criterion.reach.data(), error));
-        const VF distance = hn::Add(reach, radius), limit = hn::Mul(distance, distance);
-        const VF above = hn::Set(f, 1 + 0x1p-19f);
-        const auto shows = hn::Gt(limit, hn::Mul(squared, above));
-        const auto may_show = hn::Ge(hn::Mul(limit, above), squared);
+        const auto reach = hn::GatherIndex(I(), criterion.reach.data(), error);
+        const VF distance = hn::Add(hn::ConvertTo(f, reach), radius);
+        Answer answer = shows(distance);
+        if (criterion.hides_backs) {
+            const Answer away = facesAway(normals, radius);
+            const Answer anyhow = shows(
+                hn::Add(hn::ConvertTo(f, hn::ShiftRight<Criterion::kHiddenBits>(reach)), radius));
+            answer.yes = hn::And(answer.yes, hn::Or(anyhow.yes, hn::Not(away.maybe)));
+            answer.maybe = hn::And(answer.maybe, hn::Or(anyhow.maybe, hn::Not(away.yes)));
+        }
         // Depths below the sides have absolute errors, relative to the distance.
         VF depth = radius;
         for (const Vec3i& n : criterion.side) {
@@ -70,9 +105,9 @@ struct Scanner {
         }
         const VF margin = hn::Add(hn::Mul(distance, hn::Set(f, 0x1p-19f)), hn::Set(f, 2));
         const auto in_picture = hn::Ge(depth, margin);
-        const auto yes = hn::And(shows, in_picture);
+        const auto yes = hn::And(answer.yes, in_picture);
         put(yes, at, result.yes);
-        put(hn::AndNot(yes, may_show), at, result.open);
+        put(hn::AndNot(yes, answer.maybe), at, result.open);
     }
 
     static HWY_INLINE void put(hn::Mask<F> mask, size_t at, uint64_t& bits) {
@@ -97,11 +132,11 @@ CertainScan scanCertain(const Criterion& criterion, const Vertex* vertex,
         const VF dz = hn::ConvertTo(f, hn::Sub(z, hn::Set(i, criterion.eye.z)));
         const VF squared = hn::Add(hn::Add(hn::Mul(dx, dx), hn::Mul(dy, dy)), hn::Mul(dz, dz));
         const Scanner scanner{criterion, dx, dy, dz, squared};
-        VU split, last;
-        hn::LoadInterleaved2(u, reinterpret_cast<const uint32_t*>(criteria + scan.count), split,
-                             last);
-        scanner.test(split, scan.count, scan.split);
-        scanner.test(last, scan.count, scan.last);
+        VU split, split_normals, last, last_normals;
+        hn::LoadInterleaved4(u, reinterpret_cast<const uint32_t*>(criteria + scan.count), split,
+                             split_normals, last, last_normals);
+        scanner.test(split, split_normals, scan.count, scan.split);
+        scanner.test(last, last_normals, scan.count, scan.last);
     }
     return scan;
 }

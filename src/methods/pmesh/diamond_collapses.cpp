@@ -11,6 +11,7 @@
 #include "coarsen/diamond.h"
 #include "coarsen/key_map.h"
 #include "coarsen/level_items.h"
+#include "methods/pmesh/twins.h"
 #include "simplify/simplify.h"
 
 namespace pietra::pmesh {
@@ -78,6 +79,24 @@ struct DiamondResult {
     uint64_t dummies = 0, input_triangles = 0;
     Recorder::Refused refused;
 };
+
+/// What one triangle of a component knows all of it do.
+void spreadOverEdges(const Mesh& mesh, std::vector<uint8_t>& known) {
+    const HalfEdges edges = findHalfEdges(mesh.triangle, mesh.vertexCount());
+    std::vector<uint32_t> waiting;
+    for (uint32_t t = 0; t < known.size(); ++t)
+        if (known[t]) waiting.push_back(t);
+    while (!waiting.empty()) {
+        const uint32_t t = waiting.back();
+        waiting.pop_back();
+        for (uint32_t k = 0; k < 3; ++k) {
+            const uint32_t twin = edges.twin[3 * t + k];
+            if (twin == kNoCorner || known[twin >> 2]) continue;
+            known[twin >> 2] = 1;
+            waiting.push_back(twin >> 2);
+        }
+    }
+}
 
 /// Merges cells by the names of their vertices and collapses what may be.
 class Collapser {
@@ -158,7 +177,7 @@ void Collapser::run(std::span<const uint32_t> quota, float child_error,
     }
     std::vector<VertexHistory> history;
     for (const VertexState& state : state_) history.push_back(state.history);
-    Recorder recorder(mesh_, std::move(history), bound_, effort, kLocal, shift_);
+    Recorder recorder(mesh_, std::move(history), bound_, closed_, effort, kLocal, shift_);
     SimplifyInput input;
     input.mesh = &mesh_;
     input.cell = label_;
@@ -225,7 +244,7 @@ void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult&
             const float bound = recorder.boundOf(slot[t]);
             result.cells[c].bounds.to_original.push_back(bound);
             // One number is for both directions (surface_map.h): the other one's place is free.
-            result.cells[c].bounds.from_original.push_back(closed_[slot[t]]);
+            result.cells[c].bounds.from_original.push_back(recorder.isClosed(slot[t]));
             result.errors[c] = std::max(result.errors[c], bound);
         }
     }
@@ -439,6 +458,7 @@ void LevelCollapser::runRoot() {
     const std::vector<float>& closed = result.cells[0].bounds.from_original;
     out_.base_closed.assign(closed.begin(), closed.end());
     out_.base = std::move(result.cells[0].mesh);
+    spreadOverEdges(out_.base, out_.base_closed);
     std::vector<float> scalars;
     for (size_t v = 0; v < out_.base.vertexCount(); ++v) {
         const VertexState state = stateOf(out_.base, v);

@@ -189,6 +189,7 @@ void Encoder::refine(Work& work) {
         packed.structure = StructureWord::of(code[0], code[1], o.level);
         packed.ranks = o.ranks;
         packed.delta = o.delta;
+        packed.normals = o.normals;
         packed.normal = o.normal;
         packed.shift = o.shift;
         work.node.operation.push_back(packed);
@@ -202,6 +203,7 @@ Operation Encoder::encodeOperation(uint32_t record, const CollapseShape& r,
     Operation o{};
     o.level = uint16_t(collapses_.largest_height - r.height);
     o.normal = r.normal;
+    o.normals = r.normals;
     o.radius = uint16_t(encodeRoundedUp<11>(r.radius));
     o.error = errorCode(errorFor(double(r.error) / step_, above.rounding));
     if (r.ring_size > 0) {

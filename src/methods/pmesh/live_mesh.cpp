@@ -27,8 +27,14 @@ struct NodePage : LivePage {
     OperationNode node;
 };
 
-Criterion criterionFor(const View& view, const Lattice& lattice, double pixels) {
-    return pixels > 0 ? criterionOf(view, lattice, pixels) : criterionOf(-1.0, lattice);
+/// Outside of the input's bounds the eye is outside of all closed parts, whatever is drawn of them.
+Criterion criterionFor(const View& view, const ModelInfo& info, double pixels) {
+    if (pixels <= 0) return criterionOf(-1.0, info.lattice);
+    Criterion criterion = criterionOf(view, info.lattice, pixels);
+    const Vec3d eye = view.eye();
+    criterion.hides_backs = glm::any(glm::lessThan(eye, Vec3d(info.bounds.min))) ||
+                            glm::any(glm::greaterThan(eye, Vec3d(info.bounds.max)));
+    return criterion;
 }
 
 /// With its roots.
@@ -66,7 +72,8 @@ size_t bytesOfBase(const ProgressiveMesh& mesh) {
 class LiveMesh : public LiveModel {
 public:
     explicit LiveMesh(const ModelReader& reader)
-        : rows_(rowsOf(reader.nodes(), reader.info().lattice.shift)),
+        : info_(reader.info()),
+          rows_(rowsOf(reader.nodes(), reader.info().lattice.shift)),
           nodes_(openRoots(reader), uint32_t(rows_.size())),
           adaption_(nodes_.mesh(), &nodes_),
           base_bytes_(bytesOfBase(nodes_.mesh())),
@@ -86,7 +93,7 @@ public:
     std::span<const LiveChunk> chunks() const override { return chunks_.chunks(); }
     std::vector<uint32_t> requests(size_t most) const override { return nodes_.requests(most); }
     std::vector<uint32_t> prefetch(const View& view, double pixels, size_t most) override {
-        return nodes_.prefetch(criterionFor(view, lattice(), pixels), most);
+        return nodes_.prefetch(criterionFor(view, info_, pixels), most);
     }
     size_t bytes() const override { return nodes_.bytes() + meshBytes(); }
     size_t pageBytes() const override { return nodes_.nodeBytes(); }
@@ -107,6 +114,7 @@ private:
     double largestError(const View& view) const;
     void tell(const std::string& what);
 
+    const ModelInfo info_;
     const std::vector<NodeRow> rows_;
     ResidentNodes nodes_;
     Adaption adaption_;
@@ -147,7 +155,7 @@ uint64_t LiveMesh::drawable(uint64_t triangles) const {
 }
 
 const LiveFrame& LiveMesh::adapt(const LiveTask& task) {
-    Criterion criterion = criterionFor(*task.view, lattice(), task.pixels);
+    Criterion criterion = criterionFor(*task.view, info_, task.pixels);
     if (task.seen != nullptr && task.pixels > 0)
         criterion.occlusion = std::make_shared<Occlusion>(*task.seen, lattice());
     FrameLimits limits;

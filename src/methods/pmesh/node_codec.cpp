@@ -10,7 +10,7 @@
 namespace pietra::pmesh {
 namespace {
 
-constexpr uint8_t kOperationsCodec = 2;
+constexpr uint8_t kOperationsCodec = 3, kCodecWithoutNormals = 2;
 
 /// Columns of numbers on their way into or out of bytes.
 class Columns {
@@ -87,15 +87,21 @@ enum Column : size_t {
     kNormal = kDelta + 6,  // four
     kWord = kNormal + 4,   // of a colour eight, then of each scalar two
 };
-size_t columnCount(WordLayout layout) {
-    return kWord + 8 * layout.colours + 2 * layout.scalars;
+/// Then, but of kCodecWithoutNormals, three of the boxes of normals.
+size_t columnCount(WordLayout layout, uint8_t codec) {
+    const size_t boxes = codec == kCodecWithoutNormals ? 0 : 3;
+    return kWord + 8 * layout.colours + 2 * layout.scalars + boxes;
 }
 
 /// One statement of the order and of the predictions for both directions.
 template <bool kDecode>
 class NodeCoder {
 public:
-    NodeCoder(Columns& columns, OperationNode& node) : columns_(columns), node_(node) {}
+    NodeCoder(Columns& columns, OperationNode& node, uint8_t codec)
+        : columns_(columns),
+          node_(node),
+          first_box_(columnCount(node.layout, kCodecWithoutNormals)),
+          has_boxes_(codec != kCodecWithoutNormals) {}
 
     /// False only if the columns are not those of a node.
     bool run() {
@@ -143,9 +149,12 @@ private:
     void codeDeltas(NodeOperation& o);
     void codeNormals(NodeOperation& o, uint32_t s);
     void codeWords(uint32_t s);
+    void codeBox(NodeOperation& o);
 
     Columns& columns_;
     OperationNode& node_;
+    const size_t first_box_;
+    const bool has_boxes_;
     Parent parent_;
     std::vector<Parent> above_;  // of slots beyond the frontier, so far
 };
@@ -182,6 +191,7 @@ void NodeCoder<kDecode>::codeOperation(uint32_t s, std::array<uint32_t, 3>& next
     codeDeltas(o);
     codeNormals(o, s);
     codeWords(s);
+    if (has_boxes_) codeBox(o);
 }
 
 template <bool kDecode>
@@ -263,6 +273,23 @@ void NodeCoder<kDecode>::codeWords(uint32_t s) {
     }
 }
 
+/// By how much it is smaller than the one above.
+template <bool kDecode>
+void NodeCoder<kDecode>::codeBox(NodeOperation& o) {
+    const bool inside = parent_.slot != kNodeSlots;
+    const NormalBox above = inside ? node_.operation[parent_.slot].normals : NormalBox();
+    for (size_t k = 0; k < 3; ++k) {
+        if constexpr (kDecode) {
+            const uint32_t code = columns_.get(first_box_ + k);
+            o.normals.set(k, above.low(k) + int32_t(code & 15),
+                          above.high(k) - int32_t(code >> 4 & 15));
+        } else {
+            columns_.put(first_box_ + k, uint32_t(o.normals.low(k) - above.low(k)) |
+                                             uint32_t(above.high(k) - o.normals.high(k)) << 4);
+        }
+    }
+}
+
 Columns& threadColumns(size_t count) {
     thread_local Columns columns;
     columns.begin(count);
@@ -272,9 +299,9 @@ Columns& threadColumns(size_t count) {
 }  // namespace
 
 std::vector<std::byte> encodeNode(const OperationNode& node) {
-    Columns& columns = threadColumns(columnCount(node.layout));
+    Columns& columns = threadColumns(columnCount(node.layout, kOperationsCodec));
     OperationNode copy = node;
-    NodeCoder<false>(columns, copy).run();
+    NodeCoder<false>(columns, copy, kOperationsCodec).run();
     std::vector<std::byte> bytes;
     bytes.reserve(24 * kNodeSlots);
     ByteWriter writer(bytes);
@@ -288,16 +315,17 @@ std::vector<std::byte> encodeNode(const OperationNode& node) {
 bool decodeNode(std::span<const std::byte> bytes, NodeIndex index, const NodeRow& row,
                 WordLayout layout, OperationNode& node, std::string& fault) {
     ByteReader reader(bytes);
-    if (reader.fixed<uint8_t>() != kOperationsCodec || !reader.ok())
+    const auto codec = reader.fixed<uint8_t>();
+    if ((codec != kOperationsCodec && codec != kCodecWithoutNormals) || !reader.ok())
         return fault = "its codec is unknown", false;
     node.operation.assign(reader.varintUpTo(kNodeSlots), {});
     node.frontier = reader.varintUpTo(uint32_t(node.operation.size()));
     for (auto& levels : node.reference_level) levels.clear();
     node.layout = layout;
     node.word.assign(2 * layout.words() * node.operation.size(), 0);
-    Columns& columns = threadColumns(columnCount(layout));
+    Columns& columns = threadColumns(columnCount(layout, codec));
     if (!columns.read(reader, 2 * kNodeSlots, fault)) return false;
-    if (!NodeCoder<true>(columns, node).run())
+    if (!NodeCoder<true>(columns, node, codec).run())
         return fault = "its columns are not those of a node", false;
     fault = faultOf(index, row, node);
     return fault.empty();

@@ -35,6 +35,6 @@ std::vector<std::byte> encodeBase(const NodeForest& forest);
                               std::string& fault);
 
 /// ModelIdentity::method_format of files written now, and those from which on something is told.
-inline constexpr uint32_t kMethodFormat = 1, kFormatWithClosed = 1;
+inline constexpr uint32_t kMethodFormat = 2, kFormatWithClosed = 1, kFormatWithNormals = 2;
 
 }  // namespace pietra::pmesh

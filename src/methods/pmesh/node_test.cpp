@@ -50,7 +50,7 @@ TEST_P(EachForest, ANodeIsNeededBeforeAnythingInItOrBelow) {
         std::vector<uint8_t> needed(forest.row.size(), 0);
         for (NodeIndex n = 0; n < forest.row.size(); ++n) {
             const NodeRow& row = forest.row[n];
-            needed[n] = view.needs(row.centre, row.error, row.radius);
+            needed[n] = view.needs(row.centre, row.error, row.radius, NormalBox().word());
             if (needed[n] && row.parent != kNoNode) {
                 EXPECT_TRUE(needed[row.parent]);
             }
@@ -58,7 +58,7 @@ TEST_P(EachForest, ANodeIsNeededBeforeAnythingInItOrBelow) {
         for (OperationId id = 0; id < built.mesh.operation.size(); ++id) {
             const Operation& o = built.mesh.operation[id];
             if (o.error == 0) continue;
-            if (view.needs(centre[id], o.error, o.radius)) {
+            if (view.needs(centre[id], o.error, o.radius, o.normals.word())) {
                 EXPECT_TRUE(needed[nodeOf(id)]) << id;
             }
             for (const int end : {0, 1})

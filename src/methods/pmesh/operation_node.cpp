@@ -14,6 +14,7 @@ Operation toOperation(NodeIndex node, const NodeRow& row, const NodeOperation& n
     o.ranks = n.ranks;
     o.shift = n.shift;
     o.delta = n.delta;
+    o.normals = n.normals;
     o.normal = n.normal;
     return o;
 }

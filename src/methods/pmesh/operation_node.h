@@ -69,11 +69,12 @@ struct NodeOperation {
     std::array<std::array<int8_t, 3>, 2> delta{};
     std::array<uint16_t, 2> normal{};
     uint8_t shift = 0;
-    uint8_t unused = 0;
+    NormalBox normals;
+    std::array<uint8_t, 2> unused{};
     bool isDummy() const { return ranks == Operation::kDummyRanks; }
     bool operator==(const NodeOperation&) const = default;
 };
-static_assert(sizeof(NodeOperation) == 20);
+static_assert(sizeof(NodeOperation) == 24);
 
 /// A node as its page is decoded.
 struct OperationNode {

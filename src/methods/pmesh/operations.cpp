@@ -5,7 +5,7 @@
 namespace pietra::pmesh {
 
 bool criteriaNest(const Operation& parent, const Operation& child, int end) {
-    if (child.error > parent.error) return false;
+    if (child.error > parent.error || !parent.normals.encloses(child.normals)) return false;
     const Vec3l d(parent.offset(end));
     const int64_t room = int64_t(decodeRadius(parent.radius)) - decodeRadius(child.radius);
     return room >= 0 && d.x * d.x + d.y * d.y + d.z * d.z <= room * room;
@@ -15,6 +15,7 @@ std::string faultOf(const Operation& o) {
     if (o.level > kMaxLevel)
         return fmt::format("its level is {}, the largest is {}", o.level, kMaxLevel);
     if (o.radius > kMaxRadiusCode) return fmt::format("its radius has the code {}", o.radius);
+    if (o.normals.empty()) return "its box of normals is empty";
     if (o.shift > (o.isDummy() ? 0 : 20))
         return fmt::format("its deltas are shifted by {}", o.shift);
     if (o.rankLeft() == o.rankRight() && !o.isDummy()) return "its neighbours have equal ranks";

@@ -25,8 +25,8 @@
 // before were too coarse for the edges around.
 //
 // All positions are integers, in *steps* of 2^Lattice::shift, so that a collapse undoes its split
-// exactly. Criteria are saturated: an operation's error is no less, and its sphere encloses those,
-// of the operations below it, also after rounding.
+// exactly. Criteria are saturated: an operation's error is no less, and its sphere and its box of
+// normals enclose those, of the operations below it, also after rounding.
 //
 // Plain data, immutable once built; any number of threads may read it.
 
@@ -39,6 +39,7 @@
 
 #include "geometry/lattice.h"
 #include "geometry/mesh.h"
+#include "methods/pmesh/normal_box.h"
 #include "methods/pmesh/vertex_words.h"
 
 namespace pietra::pmesh {
@@ -108,7 +109,8 @@ struct Operation {
     uint8_t ranks;    ///< of vl in the lower, of vr in the upper four bits
     uint8_t shift;    ///< of the deltas
     std::array<std::array<int8_t, 3>, 2> delta;  ///< from the unsplit vertex to v, to u: << shift
-    std::array<uint16_t, 2> normal;              ///< of v and of u after the split
+    NormalBox normals;  ///< saturated: of the faces around before and after the split, and below
+    std::array<uint16_t, 2> normal;  ///< of v and of u after the split
 
     uint32_t rankLeft() const { return ranks & 15u; }
     uint32_t rankRight() const { return ranks >> 4; }

@@ -45,6 +45,47 @@ void expectIsInput(const ActiveMesh& mesh, const Built& built) {
     }
 }
 
+void expectEnclosed(const ActiveMesh& mesh, uint32_t v, const NormalBox& box) {
+    for (uint32_t f = 0; f < mesh.faceCount(); ++f) {
+        std::array<Vec3d, 3> at;
+        bool is_around = false;
+        for (uint32_t k = 0; k < 3; ++k) {
+            at[k] = Vec3d(mesh.vertex[mesh.vertexAt(4 * f + k)].position());
+            is_around |= mesh.vertexAt(4 * f + k) == v;
+        }
+        NormalBox one = NormalBox::none();
+        one.add(glm::cross(at[1] - at[0], at[2] - at[0]));
+        if (is_around && !one.empty()) {
+            ASSERT_TRUE(box.encloses(one)) << f;
+        }
+    }
+}
+
+/// Where nothing is rounded: of all faces that a split finds and makes.
+TEST(PmeshBuild, BoxesHoldTheNormalsOfAllFaces) {
+    for (const test::Shape& shape :
+         {dented(test::sphereShape(10), 0.01), test::gridShape(14, 0.1)}) {
+        const Built built = buildFor(onLattice(shape, 120));
+        ActiveMesh mesh(built.mesh);
+        std::map<OperationId, uint32_t> waiting;
+        const auto wait = [&](uint32_t v) {
+            if (mesh.record[v].next != kNoOperation) waiting[mesh.record[v].next] = v;
+        };
+        for (uint32_t v = 0; v < mesh.vertexCount(); ++v) wait(v);
+        for (const OperationId id : coarseToFine(built.mesh)) {
+            const uint32_t v = waiting.at(id), u = uint32_t(mesh.vertexCount());
+            const Operation& o = built.mesh.operation[id];
+            ASSERT_EQ(o.shift, 0);
+            ASSERT_NO_FATAL_FAILURE(expectEnclosed(mesh, v, o.normals));
+            ASSERT_TRUE(mesh.apply(v));
+            wait(v);
+            wait(u);
+            for (const uint32_t end : {v, u})
+                ASSERT_NO_FATAL_FAILURE(expectEnclosed(mesh, end, o.normals));
+        }
+    }
+}
+
 TEST_P(EachMesh, RefinedInOrderItIsTheInput) {
     const Built built = buildFor(GetParam().make());
     EXPECT_EQ(validate(built.mesh), "");
@@ -96,6 +137,45 @@ TEST(PmeshCodes, RoundUpAndAreMonotone) {
     for (uint32_t code = 1; code < 256; ++code) EXPECT_LT(decodeError(code - 1), decodeError(code));
     for (uint32_t code = 1; code <= kMaxRadiusCode; ++code)
         EXPECT_LT(decodeRadius(code - 1), decodeRadius(code));
+}
+
+TEST(PmeshCodes, BoxesEncloseTheirNormals) {
+    std::mt19937 random(5);
+    std::normal_distribution<double> any;
+    for (int i = 0; i < 1000; ++i) {
+        NormalBox box = NormalBox::none(), sum = NormalBox::none();
+        EXPECT_TRUE(box.empty());
+        for (int j = 0; j < 1 + i % 3; ++j) {
+            const Vec3d d = std::exp2(any(random)) * Vec3d(any(random), any(random), any(random));
+            NormalBox one = NormalBox::none();
+            one.add(d);
+            box.add(d);
+            sum.add(one);
+            const Vec3d n = double(NormalBox::kUnit) * glm::normalize(d);
+            for (int k = 0; k < 3; ++k) {
+                EXPECT_LE(box.low(size_t(k)), n[k]);
+                EXPECT_GE(box.high(size_t(k)), n[k]);
+                EXPECT_LE(one.high(size_t(k)) - one.low(size_t(k)), 1);
+            }
+            EXPECT_TRUE(box.encloses(one) && NormalBox().encloses(box));
+        }
+        EXPECT_EQ(box, sum);
+        EXPECT_EQ(NormalBox::ofBits(box.word()), box);
+        double longest = 0;
+        for (uint32_t corner = 0; corner < 8; ++corner) {
+            Vec3d p;
+            for (uint32_t k = 0; k < 3; ++k) p[int(k)] = corner >> k & 1 ? box.low(k) : box.high(k);
+            longest = std::max(longest, glm::length(p));
+        }
+        EXPECT_GE(box.word() >> 24, 2 * longest);
+        EXPECT_LT(box.word() >> 24, 2 * longest + 1);
+    }
+    NormalBox flat = NormalBox::none();
+    flat.add(Vec3d(0, 0, 0));
+    EXPECT_TRUE(flat.empty());
+    flat.add(Vec3d(0, 0, -3));
+    EXPECT_EQ(flat.low(0), 0);
+    EXPECT_EQ(flat.high(2), -7);
 }
 
 TEST(PmeshCodes, NormalsKeepTheirBytes) {
@@ -173,6 +253,10 @@ TEST_F(DamagedMesh, IsRefusedWithAMessage) {
     });
     expect(fmt::format("operation {}: its criteria exceed its parent's", last),
            [](ProgressiveMesh& m) { m.operation.back().error = 255; });
+    expect(fmt::format("operation {}: its criteria exceed its parent's", last),
+           [](ProgressiveMesh& m) { m.operation.back().normals = NormalBox(); });
+    expect(fmt::format("operation {}: its box of normals is empty", last),
+           [](ProgressiveMesh& m) { m.operation.back().normals = NormalBox::none(); });
 }
 
 TEST_F(DamagedMesh, IsRefusedWhereStarsDoNotFit) {

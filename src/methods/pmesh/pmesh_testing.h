@@ -128,6 +128,7 @@ inline Criterion randomView(std::mt19937& random, const Mesh& mesh) {
     std::uniform_real_distribution<double> place(-0.5, 1.5), power(-4, 6);
     Criterion criterion;
     for (int k = 0; k < 3; ++k) criterion.eye[k] = int32_t(box.min[k] + place(random) * size[k]);
+    criterion.hides_backs = random() % 2 == 0;
     const double scale = std::exp2(power(random)) * kErrorUnit * 32;
     for (uint32_t code = 1; code < 256; ++code)
         criterion.reach[code] = int32_t(std::min(double(decodeError(code)) * scale, 0x1p25));

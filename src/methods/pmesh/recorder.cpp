@@ -34,15 +34,17 @@ Recorder::Recorder(const Mesh& mesh, std::span<const uint8_t> irregular, int shi
       shift_(shift),
       normal_(mesh.normal),
       history_(mesh.vertexCount()),
+      closed_(mesh.triangleCount(), 1),
       map_(std::vector<float>(mesh.triangleCount(), 0), {}),
       layout_(WordLayout::of(mesh)) {}
 
 Recorder::Recorder(const Mesh& mesh, std::vector<VertexHistory> history,
-                   const std::vector<float>& bound, const SurfaceMap::Effort& effort,
-                   uint32_t first_record, int shift)
+                   const std::vector<float>& bound, std::vector<uint8_t> closed,
+                   const SurfaceMap::Effort& effort, uint32_t first_record, int shift)
     : shift_(shift),
       normal_(mesh.normal),
       history_(std::move(history)),
+      closed_(std::move(closed)),
       map_(bound, effort),
       largest_error_(*std::max_element(bound.begin(), bound.end())),
       first_record_(first_record),
@@ -89,13 +91,18 @@ void Recorder::push(uint32_t v, CollapseLink link, CollapseRecord record) {
         link.box.add(below.box);
         link.error = std::max(link.error, below.error);
         link.operations += below.operations;
+        record.normals.add(below.normals);
     };
     addBelow(h);
     if (link.u != CollapseLink::kNone) addBelow(history_[link.u]);
     record.error = link.error;
     largest_ = std::max(largest_, uint32_t(record.height));
-    h = {first_record_ + uint32_t(record_.size()), record.height, link.operations, link.error,
-         link.box};
+    h = {first_record_ + uint32_t(record_.size()),
+         record.height,
+         link.operations,
+         link.error,
+         link.box,
+         record.normals};
     link_.push_back(link);
     record_.push_back(record);
 }
@@ -107,9 +114,11 @@ void Recorder::addWords(const CollapseStep& step, uint32_t vertex) {
     appendWords(one_, 0, layout_, words_);
 }
 
-void Recorder::recordDummy(const CollapseStep& step, uint32_t end) {
+/// `normals`: of what the collapse after it finds and makes.
+void Recorder::recordDummy(const CollapseStep& step, uint32_t end, const NormalBox& normals) {
     for (int i = 0; i < 2; ++i) addWords(step, end);
     CollapseRecord r{};
+    r.normals = normals;
     r.position[0] = stepsOf(step.mesh, step.mesh.point[end].vec());
     r.normal[0] = packNormal(normal_[end]);
     uint32_t height = 0;
@@ -143,8 +152,26 @@ void Recorder::gatherRing(const CollapseStep& step, CollapseRecord& r) const {
     if (!r.closed) r.ring[r.ring_size++] = ring.previous[i];
 }
 
-/// Bounds of the faces that the collapse makes. False: it must not be.
-bool Recorder::mapOn(const CollapseStep& step, const CollapseRecord& r) {
+/// Of the faces before and after the collapse; the merged vertex is at 0.
+NormalBox normalsOf(const CollapsingStar& star) {
+    NormalBox normals = NormalBox::none();
+    for (uint32_t i = 0; i < star.edges(); ++i) {
+        const Vec3d a(star.ring[i]), b(star.ring[star.after(i)]), end(star.end[star.of_u[i]]);
+        normals.add(glm::cross(a, b));
+        normals.add(glm::cross(a - end, b - end));
+    }
+    for (uint32_t w = 0; w < star.wings; ++w) {
+        const CollapsingStar::Wing& wing = star.wing[w];
+        std::array<Vec3d, 3> at;
+        for (const uint32_t end : {0u, 1u}) at[wing.corner[end]] = Vec3d(star.end[end]);
+        at[wing.corner[2]] = Vec3d(star.ring[wing.ring]);
+        normals.add(glm::cross(at[1] - at[0], at[2] - at[0]));
+    }
+    return normals;
+}
+
+/// Bounds of the faces that the collapse makes, and normals. False: it must not be.
+bool Recorder::mapOn(const CollapseStep& step, CollapseRecord& r) {
     const WorkingMesh& mesh = step.mesh;
     CollapsingStar star;
     star.size = r.ring_size;
@@ -174,7 +201,22 @@ bool Recorder::mapOn(const CollapseStep& step, const CollapseRecord& r) {
             wing.corner[corner[k] == step.v ? 0 : corner[k] == step.u ? 1 : 2] = k;
     }
     const float stated = std::max(history_[step.u].error, history_[step.v].error);
-    return map_.collapse(star, stated, largest_error_);
+    if (!map_.collapse(star, stated, largest_error_)) return false;
+    const NormalBox normals = normalsOf(star);
+    if (spreadClosed(star) && !normals.empty()) r.normals = normals;
+    return true;
+}
+
+/// Of a component either all is closed or nothing is: what a face of the star knows all of them do.
+bool Recorder::spreadClosed(const CollapsingStar& star) {
+    bool closed = false;
+    const auto forFaces = [&](auto&& body) {
+        for (uint32_t i = 0; i < star.edges(); ++i) body(closed_[star.face[i]]);
+        for (uint32_t w = 0; w < star.wings; ++w) body(closed_[star.wing[w].face]);
+    };
+    forFaces([&](uint8_t is_closed) { closed |= is_closed != 0; });
+    forFaces([&](uint8_t& is_closed) { is_closed = closed; });
+    return closed;
 }
 
 bool Recorder::take(const CollapseStep& step) {
@@ -216,7 +258,7 @@ bool Recorder::take(const CollapseStep& step) {
     const uint32_t shift = quantiseOffsets({r.position[0] - to, r.position[1] - to}).shift;
     const float lost = shift == 0 ? 0 : float(1 << (shift - 1)) * float(1 << shift_);
     for (const uint32_t end : {v, u})
-        if (lost > 0 && lost > precisionAt(step, end)) recordDummy(step, end);
+        if (lost > 0 && lost > precisionAt(step, end)) recordDummy(step, end, r.normals);
     addWords(step, v);
     addWords(step, u);
     r.height = uint16_t(1 + std::max({highest, heightOf(u), heightOf(v)}));

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "geometry/bounds.h"
+#include "methods/pmesh/normal_box.h"
 #include "methods/pmesh/operations.h"
 #include "methods/pmesh/surface_map.h"
 #include "methods/pmesh/vertex_words.h"
@@ -46,6 +47,8 @@ struct CollapseShape {
     uint8_t left = kNoRank, right = kNoRank;  ///< of vl and vr, in the ring
     uint8_t ring_size = 0;                    ///< 0: a dummy
     bool closed = false;
+    /// Of the faces that it and all below found and made, if they are of a closed component.
+    NormalBox normals;
 };
 struct CollapseRecord : CollapseShape {
     /// The neighbours of the merged vertex, counter-clockwise; where it is open, from the
@@ -62,11 +65,13 @@ QuantisedOffsets quantiseOffsets(const std::array<Vec3i, 2>& offset);
 
 /// What a vertex has been through.
 struct VertexHistory {
-    uint32_t last = kNoOperation;  ///< the record of the last collapse into it
-    uint32_t height = 0;           ///< of that
-    uint32_t operations = 0;       ///< of that and all below
-    float error = 0;               ///< of that
-    Box3i box;                     ///< of that and all below
+    uint32_t last = kNoOperation;           ///< the record of the last collapse into it
+    uint32_t height = 0;                    ///< of that
+    uint32_t operations = 0;                ///< of that and all below
+    float error = 0;                        ///< of that
+    Box3i box;                              ///< of that and all below
+    NormalBox normals = NormalBox::none();  ///< likewise: CollapseShape::normals
+    uint8_t unused = 0;
 };
 
 class Recorder : public CollapseSink {
@@ -77,12 +82,14 @@ public:
 
     /// `mesh`: the one that is simplified; `irregular`: one a vertex, as HalfEdges has it, or empty
     /// where such have the rank kRankFixed; both must outlive this. Positions are multiples of
-    /// 2^shift.
+    /// 2^shift. All is taken for closed.
     Recorder(const Mesh& mesh, std::span<const uint8_t> irregular, int shift);
     /// Goes on where others ended: `history` is that of the vertices, one each, `bound` that of the
-    /// faces; records of this one are counted from `first_record` on.
+    /// faces, `closed` whether these are surely of a closed component; records of this one are
+    /// counted from `first_record` on.
     Recorder(const Mesh& mesh, std::vector<VertexHistory> history, const std::vector<float>& bound,
-             const SurfaceMap::Effort& effort, uint32_t first_record, int shift);
+             std::vector<uint8_t> closed, const SurfaceMap::Effort& effort, uint32_t first_record,
+             int shift);
 
     void expect(uint32_t face, bool again) override {
         again ? map_.expectPieces(face) : map_.expect(face);
@@ -101,6 +108,8 @@ public:
     const Refused& refused() const { return refused_; }
     /// Of a face of the mesh that was not removed.
     float boundOf(uint32_t face) const { return map_.bound(face); }
+    /// The same.
+    bool isClosed(uint32_t face) const { return closed_[face]; }
     /// Has all its triangles in this mesh. Known only once a collapse was offered; else false.
     bool isInside(uint32_t v) const { return !inside_.empty() && inside_[v]; }
     const VertexHistory& historyOf(uint32_t v) const { return history_[v]; }
@@ -109,10 +118,11 @@ public:
 private:
     float precisionAt(const CollapseStep& step, uint32_t end) const;
     void addWords(const CollapseStep& step, uint32_t vertex);
-    void recordDummy(const CollapseStep& step, uint32_t end);
+    void recordDummy(const CollapseStep& step, uint32_t end, const NormalBox& normals);
     void push(uint32_t v, CollapseLink link, CollapseRecord record);
     void gatherRing(const CollapseStep& step, CollapseRecord& record) const;
-    bool mapOn(const CollapseStep& step, const CollapseRecord& record);
+    bool mapOn(const CollapseStep& step, CollapseRecord& record);
+    bool spreadClosed(const CollapsingStar& star);
     uint32_t heightOf(uint32_t v) const { return history_[v].height; }
     Vec3i stepsOf(const WorkingMesh& mesh, const Vec3f& p) const;
 
@@ -120,7 +130,7 @@ private:
     int shift_;
     std::vector<OctNormal> normal_;
     std::vector<VertexHistory> history_;
-    std::vector<uint8_t> inside_;
+    std::vector<uint8_t> closed_, inside_;
     SurfaceMap map_;
     float largest_error_ = 0;  // of any face, ever
     uint32_t first_record_ = 0;

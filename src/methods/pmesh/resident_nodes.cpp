@@ -114,7 +114,7 @@ std::vector<NodeIndex> ResidentNodes::prefetch(const Criterion& criterion, size_
         const NodeRow& row = row_[n];
         is_there[n] = isLoaded(n);
         if (is_there[n] || state_[n].is_bad || !is_there[row.parent] ||
-            !criterion.needs(row.centre, row.error, row.radius))
+            !criterion.needs(row.centre, row.error, row.radius, NormalBox().word()))
             continue;
         is_there[n] = 1;
         nodes.push_back(n);

@@ -37,6 +37,8 @@ struct CriterionBlock {
     std::array<int32_t, 4> eye;
     std::array<std::array<int32_t, 4>, 4> side;
     std::array<int32_t, 256> reach;
+    uint32_t hides_backs;
+    std::array<uint32_t, 3> unused{};
 };
 
 /// An operation as the shaders have it.
@@ -47,13 +49,13 @@ struct PackedOperation {
     std::array<std::array<int8_t, 3>, 2> delta;
     uint16_t radius_around_u;
     std::array<uint16_t, 2> normal;
-    uint32_t unused_too = 0;
+    uint32_t box_of_normals;
 };
 static_assert(sizeof(PackedOperation) == 32);
 
 PackedOperation packed(const Operation& o) {
-    return {o.child, o.level, o.radius,         o.error,  o.ranks, o.shift,
-            0,       o.delta, radiusAroundU(o), o.normal, 0};
+    return {o.child, o.level, o.radius,         o.error,  o.ranks,         o.shift,
+            0,       o.delta, radiusAroundU(o), o.normal, o.normals.word()};
 }
 
 GlBuffer makeBuffer(size_t bytes, const void* data = nullptr, GLbitfield flags = 0) {
@@ -244,6 +246,7 @@ void GlAdaption::begin(const Criterion& criterion) {
     if (wear_.takeIfOver(size().vertices)) sortInSpace();
     CriterionBlock block{};
     block.reach = criterion.reach;
+    block.hides_backs = criterion.hides_backs;
     for (int k = 0; k < 3; ++k) {
         block.eye[size_t(k)] = criterion.eye[k];
         for (size_t i = 0; i < 4; ++i) block.side[i][size_t(k)] = criterion.side[i][k];

@@ -11,7 +11,7 @@
 //     matter (fresh, released) are queues
 //   - rounds of forced marks: one of many groups, then one group until there are none
 //   - what comes free goes to rings.
-// 56 bytes a vertex and 32 a face are the mesh, 32 an operation; 90 a vertex are for finding work.
+// 64 bytes a vertex and 32 a face are the mesh, 32 an operation; 90 a vertex are for finding work.
 //
 // Needs the context in which it was made, current; also to be destroyed.
 

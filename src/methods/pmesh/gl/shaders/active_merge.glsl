@@ -31,7 +31,7 @@ uvec2 merge(uint v, Star star, uint u, Star other) {
 
     uvec4 r = record[v];
     const uvec4 s = record[u];
-    uvec2 c = criteria[v];
+    uvec4 c = criteria[v];
     const uint id = r.y;
     const uvec4 o = operation[2u * id];
     vertex[v] = ivec4(vertex[v].xyz - offset(id, o, 0u), int(s.w & 0xffffu));

@@ -91,26 +91,28 @@ bool isNewEnd(uvec4 p, uvec4 r) {
 bool canUndo(uvec4 p, uvec4 r) {
     return r.y != kNone && (isNewEnd(p, r) || isDummy(operation[2u * r.y]));
 }
-void setNext(inout uvec4 p, inout uvec4 r, inout uvec2 c, uint next) {
+void setNext(inout uvec4 p, inout uvec4 r, inout uvec4 c, uint next) {
     r.x = next;
     r.w &= 0xffffu;
     uint level = kLeafLevel;
-    c.x = 0u;
+    c.xy = uvec2(0u);
     if (next != kNone) {
         const uvec4 o = operation[2u * next];
         level = o.z & 0xffffu;
-        c.x = o.z >> 16 | (o.w & 0xffu) << 16;
+        c.xy = uvec2(o.z >> 16 | (o.w & 0xffu) << 16, operation[2u * next + 1u].w);
     }
     p.z = (p.z & 0xffff0000u) | level;
 }
-void setLast(inout uvec4 p, inout uvec4 r, inout uvec2 c, uint last) {
+void setLast(inout uvec4 p, inout uvec4 r, inout uvec4 c, uint last) {
     r.y = last;
-    c.y = kEverNeeded;
+    c.zw = uvec2(kEverNeeded, 0u);
     p.z &= 0xffffu;
     if (last == kNone) return;
     const uvec4 o = operation[2u * last];
     p.z |= ((o.z & 0xffffu) + 1u) << 16;
-    if (canUndo(p, r)) c.y = operation[2u * last + 1u].y >> 16 | (o.w & 0xffu) << 16;
+    if (!canUndo(p, r)) return;
+    const uvec4 rest = operation[2u * last + 1u];
+    c.zw = uvec2(rest.y >> 16 | (o.w & 0xffu) << 16, rest.w);
 }
 
 uint otherEnd(uint v) {

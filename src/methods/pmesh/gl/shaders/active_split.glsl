@@ -65,7 +65,7 @@ uvec2 splitFaces(uint v, Star star, uint u, uvec2 faces, uint l, uint r, bool ha
 uvec2 split(uint v, Star star, uint u, uvec2 faces) {
     const uvec4 before = pulse[v];
     uvec4 a = before, b, r = record[v], s;
-    uvec2 c = uvec2(0u), d = uvec2(0u);
+    uvec4 c = uvec4(0u), d = uvec4(0u);
     const uint id = r.x;
     const uvec4 o = operation[2u * id];
     const bool has_left = rankLeft(o) != kNoRank, has_right = rankRight(o) != kNoRank;

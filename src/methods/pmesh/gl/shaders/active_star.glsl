@@ -65,7 +65,7 @@ void changeAround(Star star, uvec4 before, inout uvec4 after) {
 void move(uint v, Star star) {
     const uvec4 before = pulse[v];
     uvec4 p = before, r = record[v];
-    uvec2 c = criteria[v];
+    uvec4 c = criteria[v];
     const uint id = r.x;
     const uvec4 o = operation[2u * id];
     vertex[v].xyz += offset(id, o, 0u);
@@ -80,7 +80,7 @@ void move(uint v, Star star) {
 void moveBack(uint v, Star star) {
     const uvec4 before = pulse[v];
     uvec4 p = before, r = record[v];
-    uvec2 c = criteria[v];
+    uvec4 c = criteria[v];
     const uint id = r.y;
     const uvec4 o = operation[2u * id];
     vertex[v].xyz -= offset(id, o, 0u);

@@ -13,11 +13,11 @@ const uint kEverNeeded = 0x7fffu, kBlocked = 0x8000u;
 
 layout(std430, binding = 0) buffer Vertices { ivec4 vertex[]; };  // position, normal
 layout(std430, binding = 1) buffer Pulses { uvec4 pulse[]; };     // name, corner, levels, around
-layout(std430, binding = 2) buffer Criteria { uvec2 criteria[]; };  // of the next split, the last
+layout(std430, binding = 2) buffer Criteria { uvec4 criteria[]; };  // two each: next split, last
 layout(std430, binding = 3) buffer Records { uvec4 record[]; };     // next, last, undo_*
 layout(std430, binding = 4) buffer Faces { uint face[]; };          // ActiveFace: eight each
 /// Two each: children, level | radius << 16, error | ranks << 8 | shift << 16; deltas with the
-/// radius around u, normals.
+/// radius around u, normals, the box of normals.
 layout(std430, binding = 5) readonly buffer Operations { uvec4 operation[]; };
 
 /// Sets are a bit a vertex; how many are in each block of them is counted as they come.

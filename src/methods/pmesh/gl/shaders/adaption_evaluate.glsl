@@ -4,15 +4,16 @@
 /// Whether the operation that made u is.
 bool isNeeded(uint u) {
     const ivec3 p = vertex[u].xyz;
-    if (needsLast(p, criteria[u].y)) return true;
+    if (needsLast(p, criteria[u].zw)) return true;
     const uint id = record[u].y;
     const uvec4 o = operation[2u * id];
-    return needs(p - offset(id, o, isDummy(o) ? 0u : 1u), o.z >> 16 | (o.w & 0xffu) << 16);
+    return needs(p - offset(id, o, isDummy(o) ? 0u : 1u),
+                 uvec2(o.z >> 16 | (o.w & 0xffu) << 16, operation[2u * id + 1u].w));
 }
 
 void setBlocked(uint u, bool blocked) {
-    const uint c = criteria[u].y;
-    criteria[u].y = blocked ? c | kBlocked : c & ~kBlocked;
+    const uint c = criteria[u].z;
+    criteria[u].z = blocked ? c | kBlocked : c & ~kBlocked;
 }
 
 bool anyMarkedAround(uint v) {

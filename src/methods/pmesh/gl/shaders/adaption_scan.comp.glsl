@@ -15,10 +15,10 @@ void main() {
         barrier();
         bool is_split = false, is_merge = false;
         if (v < vertices) {
-            const uvec2 c = criteria[v];
+            const uvec4 c = criteria[v];
             const ivec3 p = vertex[v].xyz;
-            is_split = needs(p, c.x);
-            is_merge = !needsLast(p, c.y);
+            is_split = needs(p, c.xy);
+            is_merge = !needsLast(p, c.zw);
         }
         uint place[2];
         if (is_split) {

@@ -206,7 +206,7 @@ void rename() {
 uvec4 element(uint kind, uint i) {
     if (kind == 0u) return uvec4(vertex[i]);
     if (kind == 1u) return pulse[i];
-    if (kind == 2u) return uvec4(criteria[i], 0u, 0u);
+    if (kind == 2u) return criteria[i];
     if (kind == 3u) return record[i];
     const uint at = 8u * i + 4u * (kind - 4u);
     return uvec4(face[at], face[at + 1u], face[at + 2u], face[at + 3u]);
@@ -226,7 +226,7 @@ void moveBack(uint kind) {
         const uvec4 e = uvec4(work[at], work[at + 1u], work[at + 2u], work[at + 3u]);
         if (kind == 0u) vertex[i] = ivec4(e);
         if (kind == 1u) pulse[i] = e;
-        if (kind == 2u) criteria[i] = e.xy;
+        if (kind == 2u) criteria[i] = e;
         if (kind == 3u) record[i] = e;
         if (kind >= 4u)
             for (uint k = 0u; k < 4u; ++k) face[8u * i + 4u * (kind - 4u) + k] = e[k];

@@ -22,7 +22,7 @@ void wakeAround(Star star, uint v, uint at) {
         }
         is_forced = is_forced || level < nextLevel(pulse[w]);
     }
-    if (is_forced || needs(vertex[v].xyz, criteria[v].x)) mark(v, 0u);
+    if (is_forced || needs(vertex[v].xyz, criteria[v].xy)) mark(v, 0u);
 }
 
 void applySplits() {

@@ -24,7 +24,7 @@ void enter() {
 void unblock(uint u) {
     erase(at_is_released, u);
     if (!isNewEnd(pulse[u], record[u])) u = otherEnd(u);
-    if (canUndo(pulse[u], record[u])) criteria[u].y &= ~kBlocked;
+    if (canUndo(pulse[u], record[u])) criteria[u].z &= ~kBlocked;
 }
 
 /// side: 0 for vertices, 1 for faces.
