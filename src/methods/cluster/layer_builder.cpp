@@ -328,9 +328,18 @@ std::vector<uint32_t> Builder::removedBy(CellId cell, bool given) const {
 void Builder::boundStripsOf(const CellStep& step) {
     const std::vector<uint32_t> removed = removals_->removedFrom(step.cell);
     if (removed.empty()) return;
-    const CellLayer base = load(step, workers_.local(), nullptr);
-    const std::vector<float> bounds = boundStrips(stripsOf(step.cell, removed, false),
-                                                  base.triangles.mesh, base.error, base.bounds);
+    Worker& worker = workers_.local();
+    const Mesh strips = stripsOf(step.cell, removed, false);
+    std::vector<float> bounds;
+    if (isFirst(step)) {  // without its polygons
+        const CellBlob& blob = leaves_.blobs.at(step.cell);
+        blob.store->get(blob, worker.leaf);
+        bounds =
+            boundStrips(strips, worker.leaf.mesh, settings_.quantisation_error, worker.leaf.bounds);
+    } else {
+        const CellLayer base = load(step, worker, nullptr);
+        bounds = boundStrips(strips, base.triangles.mesh, base.error, base.bounds);
+    }
     for (size_t i = 0; i < removed.size(); ++i)
         removals_->boundsOf(removed[i]).by[removals_->sideOf(removed[i], step.cell)] = bounds[i];
     progress_.tick(0);
