@@ -26,6 +26,7 @@
 #include "base/budget.h"
 #include "geometry/lattice.h"
 #include "geometry/mesh.h"
+#include "methods/pmesh/front/huge_memory.h"
 #include "methods/pmesh/operations.h"
 
 namespace pietra::pmesh {
@@ -74,7 +75,7 @@ struct LeafForest {
     /// A grid unit is 2^grid_shift steps; its origin in steps.
     int grid_shift = 0;
     Vec3i grid_origin{0, 0, 0};
-    std::vector<LeafSplit> split;  ///< by leaf; unused where a root begins
+    std::vector<LeafSplit, HugeAllocator<LeafSplit>> split;  ///< by leaf; unused where a root begins
     std::vector<LeafRoot> root;    ///< in the order of leaves
     std::vector<Leaf> base_corner;  ///< three a triangle that is always there
 

@@ -38,10 +38,8 @@ LeafFront::LeafFront(const LeafForest& forest) : forest_(forest) {
     count_.resize(blocks);
     block_.resize(blocks);
     index_ = {active_, slot_.data(), count_.data()};
-    // Of pages that nobody writes to there is only the address.
-    page_.reset(static_cast<FrontPage*>(
-        std::aligned_alloc(alignof(FrontPage), blocks * kPages * sizeof(FrontPage))));
-    CHECK(page_ != nullptr || blocks == 0);
+    pool_.reset(HugeAllocator<FrontPage>().allocate(blocks * kPages));
+    place_of_page_.resize(blocks * kPages);
     for (const LeafRoot& root : forest.root) {
         const auto [page, slot] = add(root.first);
         NestedCriterion ever;
@@ -58,15 +56,33 @@ LeafFront::LeafFront(const LeafForest& forest) : forest_(forest) {
     for (Block& b : block_) b.changed = false;
 }
 
+/// An empty one.
+void LeafFront::addPage(uint32_t block) {
+    uint32_t& place = place_of_page_[block * kPages + block_[block].pages++];
+    {
+        const std::lock_guard lock(pool_mutex_);
+        if (free_places_.empty()) {
+            place = pool_end_++;
+        } else {
+            place = free_places_.back();
+            free_places_.pop_back();
+        }
+    }
+    std::memset(static_cast<void*>(&pool_[place]), 0, sizeof(FrontPage));
+}
+
+/// The last one.
+void LeafFront::removePage(uint32_t block) {
+    const std::lock_guard lock(pool_mutex_);
+    free_places_.push_back(place_of_page_[block * kPages + --block_[block].pages]);
+}
+
 /// A slot in its block. All but its first leaf is to be filled in.
 LeafFront::Place LeafFront::add(Leaf vertex) {
     const uint32_t block = vertex >> kBlockBits;
     Block& b = block_[block];
     while (b.first_free < b.pages && pageOf(block, b.first_free).alive == ~0u) ++b.first_free;
-    if (b.first_free == b.pages) {
-        std::memset(static_cast<void*>(&pageOf(block, b.pages)), 0, sizeof(FrontPage));
-        ++b.pages;
-    }
+    if (b.first_free == b.pages) addPage(block);
     FrontPage& page = pageOf(block, b.first_free);
     const auto slot = uint32_t(std::countr_one(page.alive));
     page.alive |= 1u << slot;
@@ -91,7 +107,8 @@ void LeafFront::decide(uint32_t block, const FrontView& view) {
     b.grown = 0;
     for (uint32_t p = 0; p < b.pages; ++p) {
         FrontPage& page = pageOf(block, p);
-        prefetchLines(&page + 1, sizeof(page.birth) + sizeof(page.next));
+        if (p + 1 < b.pages)
+            prefetchLines(&pageOf(block, p + 1), sizeof(page.birth) + sizeof(page.next));
         const PageScan scan = scanPage(view, page);
         const uint32_t drop = page.alive & ~scan.birth;
         page.opened = scan.next & ~drop;
@@ -208,7 +225,7 @@ void LeafFront::pack(uint32_t block) {
     if (b.pages * kPageSlots < count + count / 4 + 2 * kPageSlots) return;
     const uint32_t enough = (count + kPageSlots - 1) / kPageSlots;
     uint32_t to = 0;
-    for (; b.pages > enough; --b.pages) {
+    for (; b.pages > enough; removePage(block)) {
         FrontPage& from = pageOf(block, b.pages - 1);
         forBits(from.alive, [&](uint32_t s) {
             while (pageOf(block, to).alive == ~0u) ++to;
@@ -256,7 +273,8 @@ void LeafFront::findCorners(uint32_t block) {
             page.stale = 0;
         }
         page.changed = 0;
-        prefetchLines(&(&page + 1)->leaf, sizeof(page.leaf) + sizeof(page.corner));
+        if (p + 1 < b.pages)
+            prefetchLines(&pageOf(block, p + 1).leaf, sizeof(page.leaf) + sizeof(page.corner));
         findSlots(index_, page.leaf[0].data(), page.corner[0].data(), 6 * kPageSlots);
     }
     b.changed = false;

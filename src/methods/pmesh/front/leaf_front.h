@@ -12,10 +12,11 @@
 // blocks waits for the end of a round. The outcome is a function of the view, and where it lies in
 // memory of the views before: not of the number of threads.
 //
-// Memory: 4 KiB for 32 vertices, and 17 bits a leaf. Time: docs/design/pmesh.md.
+// Memory: 4 KiB for 32 vertices, and 18 bits a leaf; pages are kept for the next frames. Time: docs/design/pmesh.md.
 
 #include <cstdlib>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -80,7 +81,9 @@ private:
         uint32_t slot;  ///< in it
     };
 
-    FrontPage& pageOf(uint32_t block, uint32_t page) const { return page_[block * kPages + page]; }
+    FrontPage& pageOf(uint32_t block, uint32_t page) const {
+        return pool_[place_of_page_[block * kPages + page]];
+    }
     Place placeOf(Leaf vertex) const {
         const uint32_t slot = slot_[vertex];
         return {pageOf(vertex >> kBlockBits, slot / kPageSlots), slot % kPageSlots};
@@ -94,6 +97,8 @@ private:
         uint32_t& count = count_[leaf >> kBlockBits];
         storeRelaxed(count, active ? count + 1 : count - 1);
     }
+    void addPage(uint32_t block);
+    void removePage(uint32_t block);
     Place add(Leaf vertex);
     void refer(FrontPage& page, uint32_t slot) const;
     void decide(uint32_t block, const FrontView& view);
@@ -112,13 +117,18 @@ private:
     FrontIndex index_;
     std::vector<uint64_t> bits_;
     uint64_t* active_;
-    std::vector<uint16_t> slot_;
+    std::vector<uint16_t, HugeAllocator<uint16_t>> slot_;
     std::vector<uint32_t> count_;
     std::vector<Block> block_;
+    /// Pages lie anywhere; only the first of the pool are ever touched.
     struct Free {
         void operator()(FrontPage* p) const { std::free(p); }
     };
-    std::unique_ptr<FrontPage[], Free> page_;
+    std::unique_ptr<FrontPage[], Free> pool_;
+    std::vector<uint32_t> place_of_page_;  ///< kPages a block
+    std::mutex pool_mutex_;
+    std::vector<uint32_t> free_places_;
+    uint32_t pool_end_ = 0;
     std::array<uint64_t, 8> changed_blocks_{};
     std::vector<Leaf> base_leaf_;
     std::vector<uint32_t> base_slot_;

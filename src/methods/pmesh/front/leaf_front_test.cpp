@@ -232,7 +232,7 @@ TEST(LeafFront, WhatChangesIsLookedUpWhereverItLies) {
     ASSERT_GT(made.forest.leaves(), 8 * kBlockLeaves);
     LeafFront front(made.forest);
     std::mt19937 random(3);
-    for (int flight = 0; flight < 4; ++flight) {
+    for (int flight = 0; flight < 2; ++flight) {
         FrontView view = randomFrontView(random, made.forest);
         for (view.reach = 0.3f; view.reach < 300; view.reach *= 1.1f) {
             front.adapt(view);
