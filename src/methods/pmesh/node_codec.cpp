@@ -284,8 +284,9 @@ void NodeCoder<kDecode>::codeBox(NodeOperation& o) {
             o.normals.set(k, above.low(k) + int32_t(code & 15),
                           above.high(k) - int32_t(code >> 4 & 15));
         } else {
-            columns_.put(first_box_ + k, uint32_t(o.normals.low(k) - above.low(k)) |
-                                             uint32_t(above.high(k) - o.normals.high(k)) << 4);
+            const auto low = uint32_t(o.normals.low(k) - above.low(k)) & 15;
+            const auto high = uint32_t(above.high(k) - o.normals.high(k)) & 15;
+            columns_.put(first_box_ + k, low | high << 4);
         }
     }
 }

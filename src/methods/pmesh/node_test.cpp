@@ -87,6 +87,16 @@ TEST_P(EachForest, SurvivesItsCodec) {
     EXPECT_EQ(base.base_operation, forest.base_operation);
 }
 
+/// Also what no normal makes, but a page may hold.
+TEST(NodeCodec, KeepsAnyBox) {
+    const Built built = buildFor(onLattice(test::sphereShape(8), 900));
+    OperationNode node = built.forest.node[0], again;
+    node.operation[0].normals.set(0, -8, 7);
+    std::string fault;
+    ASSERT_TRUE(decodeNode(encodeNode(node), 0, built.forest.row[0], {}, again, fault)) << fault;
+    EXPECT_EQ(again, node);
+}
+
 /// A tree of operations, or a chain, along a line; or all of them trees of their own.
 enum class Shape { kTree, kChain, kLoose };
 void makeCollapses(uint32_t count, Shape shape, Collapses& out) {
