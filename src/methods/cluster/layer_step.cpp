@@ -5,6 +5,7 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "coarsen/key_map.h"
 #include "geometry/lattice.h"
 #include "methods/cluster/anchors.h"
 #include "methods/cluster/interfaces.h"
@@ -213,7 +214,22 @@ float takeStrips(const Mesh& taken, std::span<const float> given_bound, const Me
 std::vector<float> boundStrips(const Mesh& strips, const Mesh& below, float error,
                                const FaceBounds& bounds) {
     std::vector<float> value(strips.triangleCount(), 0);
-    if (!value.empty()) coverStrips(strips, below, {}, bounds.from_original, error, value, false);
+    if (value.empty()) return value;
+    KeyMap near;
+    near.reserve(strips.vertexCount());
+    for (const Vec3i& p : strips.position) near.insert(latticeKey(p), 0);
+    std::vector<uint8_t> is_near;
+    for (const Vec3i& p : below.position) is_near.push_back(near.find(latticeKey(p)) != nullptr);
+    Mesh around;
+    around.position = below.position;
+    std::vector<float> from_original;
+    for (size_t t = 0; t < below.triangleCount(); ++t) {
+        const auto& [a, b, c] = below.triangle[t];
+        if (!is_near[a] && !is_near[b] && !is_near[c]) continue;
+        around.triangle.push_back(below.triangle[t]);
+        from_original.push_back(bounds.from_original[t]);
+    }
+    coverStrips(strips, around, {}, from_original, error, value, false);
     return value;
 }
 

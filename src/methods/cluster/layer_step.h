@@ -53,8 +53,8 @@ float boundLayer(const Mesh& below, float error, const Mesh& layer,
 float takeStrips(const Mesh& taken, std::span<const float> given_bound, const Mesh& layer,
                  float error, FaceBounds& bounds);
 
-/// Upper bounds of the distance to layer 0 of each triangle of `strips`, by what is known of
-/// `below`.
+/// Upper bounds of the distance to layer 0 of each triangle of `strips`, by what is known of those
+/// of `below` that have a vertex in common with one of them: some must.
 std::vector<float> boundStrips(const Mesh& strips, const Mesh& below, float error,
                                const FaceBounds& bounds);
 
