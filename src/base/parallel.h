@@ -13,6 +13,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/task_order.h"
 #include "base/worker_placement.h"
 
 namespace pietra {
@@ -30,9 +31,11 @@ private:
 /// body(i) for each i of [0, count), one task each: for coarse work.
 template <class Body>
 void parallelFor(size_t count, Body&& body) {
+    TaskOrder order;
     tbb::parallel_for(
         tbb::blocked_range<size_t>(0, count, 1),
         [&](const tbb::blocked_range<size_t>& range) {
+            const TaskOrder::Task task(order);
             WorkerPlacement::enter();
             for (size_t i = range.begin(); i < range.end(); ++i) body(i);
         },
@@ -42,9 +45,11 @@ void parallelFor(size_t count, Body&& body) {
 /// body(begin, end) over slices of [0, count) of about `grain` elements: for fine work.
 template <class Body>
 void parallelForSlices(size_t count, size_t grain, Body&& body) {
+    TaskOrder order;
     tbb::parallel_for(
         tbb::blocked_range<size_t>(0, count, grain),
         [&](const tbb::blocked_range<size_t>& range) {
+            const TaskOrder::Task task(order);
             WorkerPlacement::enter();
             body(range.begin(), range.end());
         },
@@ -60,19 +65,23 @@ void orderedPipeline(size_t count, size_t in_flight, Produce&& produce, Consume&
     // As they are consumed in order, those under way are consecutive: no two have one slot.
     std::vector<std::optional<Result>> slots(in_flight);
     size_t next = 0;
+    TaskOrder order;
     tbb::parallel_pipeline(
         in_flight,
         tbb::make_filter<void, size_t>(tbb::filter_mode::serial_in_order,
                                        [&](tbb::flow_control& control) {
+                                           const TaskOrder::Turn turn(order);
                                            if (next == count) control.stop();
                                            return next < count ? next++ : size_t(0);
                                        }) &
             tbb::make_filter<size_t, size_t>(tbb::filter_mode::parallel,
                                              [&](size_t i) {
+                                                 const TaskOrder::Task task(order);
                                                  slots[i % in_flight].emplace(produce(i));
                                                  return i;
                                              }) &
             tbb::make_filter<size_t, void>(tbb::filter_mode::serial_in_order, [&](size_t i) {
+                const TaskOrder::Turn turn(order);
                 consume(*slots[i % in_flight]);
                 slots[i % in_flight].reset();
             }));

@@ -15,23 +15,36 @@ TriangleAhead::TriangleAhead(TriangleSource& source, size_t most)
       count_(size_t(std::min<uint64_t>(
           most, std::max(source.triangleCountHint() / kBatches, kSmallestBatch)))) {
     source_.rewindTriangles();
-    task_.run([this] { readMore(); });
+    begin();
 }
 
 TriangleAhead::~TriangleAhead() {
     try {
-        task_.wait();
+        wait();
     } catch (...) {
         // Somebody else's fault is being told already.
     }
 }
 
 bool TriangleAhead::next(std::vector<std::array<uint64_t, 3>>& index) {
-    task_.wait();
+    wait();
     index.swap(ahead_);
     if (index.empty()) return false;
-    task_.run([this] { readMore(); });
+    begin();
     return true;
+}
+
+void TriangleAhead::begin() {
+    order_.begin();
+    task_.run([this] {
+        const TaskOrder::Task task(order_);
+        readMore();
+    });
+}
+
+void TriangleAhead::wait() {
+    task_.wait();
+    order_.end();
 }
 
 void TriangleAhead::readMore() {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/task_order.h"
 #include "io/triangle_source.h"
 
 namespace pietra {
@@ -25,6 +26,8 @@ public:
     bool next(std::vector<std::array<uint64_t, 3>>& index);
 
 private:
+    void begin();
+    void wait();
     void readMore();
 
     TriangleSource& source_;
@@ -33,6 +36,7 @@ private:
     size_t begin_ = 0;
     std::vector<std::array<uint64_t, 3>> ahead_;
     tbb::task_group task_;
+    TaskOrder order_;  // of the task
 };
 
 }  // namespace pietra
