@@ -239,7 +239,7 @@ TEST_P(LiveScene, onlyBacksOfClosedPartsAreLeftOut) {
         }
     }
     EXPECT_GT(known, of_closed * 9 / 10);
-    EXPECT_GT(left_out, of_closed / 50);
+    EXPECT_GT(left_out, of_closed / 100);
 }
 
 /// With a triangle less nothing is closed, and all the same else.

@@ -19,6 +19,8 @@ namespace {
 
 /// Records of a diamond before they have their final numbers.
 constexpr uint32_t kLocal = 1u << 31;
+/// That a diamond adds. Some would add 80, where collapses run along; those wait for the next level.
+constexpr uint32_t kMostHeights = 18;
 
 /// What a vertex carries from diamond to diamond, in the place of scalars.
 struct VertexState {
@@ -178,6 +180,8 @@ void Collapser::run(std::span<const uint32_t> quota, float child_error,
     std::vector<VertexHistory> history;
     for (const VertexState& state : state_) history.push_back(state.history);
     Recorder recorder(mesh_, std::move(history), bound_, closed_, effort, kLocal, shift_);
+    if (std::any_of(quota.begin(), quota.end(), [](uint32_t q) { return q > 0; }))
+        recorder.limitHeights(kMostHeights);
     SimplifyInput input;
     input.mesh = &mesh_;
     input.cell = label_;
@@ -292,7 +296,8 @@ private:
     /// stays, but matters less the coarser it gets.
     static SurfaceMap::Effort effortAt(int height) {
         if (height > 5) return {12, 0.3f};
-        return height > 3 ? SurfaceMap::Effort{8, 0.5f} : SurfaceMap::Effort{4, 0.8f};
+        if (height > 3) return {8, 0.5f};
+        return height > 1 ? SurfaceMap::Effort{4, 0.8f} : SurfaceMap::Effort{2, 0.9f};
     }
     void take(DiamondResult& result);
     static uint32_t globalRecord(uint32_t record, uint32_t first) {

@@ -50,6 +50,12 @@ Recorder::Recorder(const Mesh& mesh, std::vector<VertexHistory> history,
       first_record_(first_record),
       layout_(WordLayout::of(mesh)) {}
 
+void Recorder::limitHeights(uint32_t more) {
+    uint32_t largest = largest_;
+    for (const VertexHistory& h : history_) largest = std::max(largest, h.height);
+    most_height_ = std::min(largest + more, kMaxLevel);
+}
+
 Vec3i Recorder::stepsOf(const WorkingMesh& mesh, const Vec3f& p) const {
     return (mesh.centre + Vec3i(p)) >> shift_;
 }
@@ -233,7 +239,7 @@ bool Recorder::take(const CollapseStep& step) {
     forEdges(step, [&](uint32_t a, uint32_t b) {
         highest = std::max({highest, heightOf(a), heightOf(b)});
     });
-    if (highest + 3 > kMaxLevel + 1) return ++refused_.level, false;  // two dummies and itself
+    if (highest + 3 > most_height_ + 1) return ++refused_.level, false;  // two dummies and itself
 
     CollapseRecord r{};
     gatherRing(step, r);

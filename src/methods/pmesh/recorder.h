@@ -91,6 +91,9 @@ public:
              std::vector<uint8_t> closed, const SurfaceMap::Effort& effort, uint32_t first_record,
              int shift);
 
+    /// From now on, heights come to at most so many above the largest that there is.
+    void limitHeights(uint32_t more);
+
     void expect(uint32_t face, bool again) override {
         again ? map_.expectPieces(face) : map_.expect(face);
     }
@@ -139,7 +142,7 @@ private:
     std::vector<uint32_t> words_;
     const WordLayout layout_;
     Mesh one_;  // of one vertex: room for its attributes
-    uint32_t largest_ = 0;
+    uint32_t largest_ = 0, most_height_ = kMaxLevel;
     uint64_t dummies_ = 0;
     Refused refused_;
 };
