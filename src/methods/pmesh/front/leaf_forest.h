@@ -28,40 +28,19 @@
 #include "geometry/mesh.h"
 #include "methods/pmesh/front/huge_memory.h"
 #include "methods/pmesh/operations.h"
+#include "methods/pmesh/split_node.h"
 
 namespace pietra::pmesh {
 
-using Leaf = uint32_t;
-inline constexpr Leaf kNoLeaf = ~0u;
-
-/// An error and a box, rounded outwards, in the grid's units (LeafForest).
-struct NestedCriterion {
-    std::array<uint16_t, 3> min{}, max{};
-    uint16_t error = 0;  ///< the upper half of a float; 0: nothing is ever needed here
-
-    static constexpr uint16_t kEver = 0x7f80;  ///< infinite: needed in every view
-    static uint16_t errorUp(float error) {
-        const auto bits = std::bit_cast<uint32_t>(error);
-        return uint16_t((bits + 0xffff) >> 16);
-    }
-    bool encloses(const NestedCriterion& other) const {
-        for (size_t k = 0; k < 3; ++k)
-            if (min[k] > other.min[k] || max[k] < other.max[k]) return false;
-        return error >= other.error;
-    }
-    bool operator==(const NestedCriterion&) const = default;
-};
-static_assert(sizeof(NestedCriterion) == 14);
-
-/// All of an operation that a split and its undoing need: two lines of a cache.
-struct alignas(32) LeafSplit {
+/// All of an operation that a split and its undoing need.
+struct alignas(8) LeafSplit {
     std::array<Leaf, 2> child;         ///< the next splits of v and u, or kNoLeaf
     Leaf parent;                       ///< or kNoLeaf
     std::array<Leaf, 6> corner;        ///< of the triangles it brings; three equal: none
     std::array<Vertex, 2> vertex;      ///< v and u after it
     std::array<NestedCriterion, 2> criterion;  ///< of the children
 };
-static_assert(sizeof(LeafSplit) == 96);
+static_assert(sizeof(LeafSplit) == 104);
 
 struct LeafRoot {
     Leaf first;
