@@ -22,6 +22,7 @@
 //
 // Plain data.
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -58,6 +59,18 @@ struct NestedCriterion {
         for (size_t k = 0; k < 3; ++k)
             if (min[k] > other.min[k] || max[k] < other.max[k]) return false;
         return error >= other.error && normals.encloses(other.normals);
+    }
+    /// The largest that both enclose; maybe one of nothing, which is good enough to be nested.
+    NestedCriterion within(const NestedCriterion& other) const {
+        NestedCriterion c;
+        for (size_t k = 0; k < 3; ++k) {
+            c.min[k] = std::max(min[k], other.min[k]);
+            c.max[k] = std::min(max[k], other.max[k]);
+            c.normals.set(k, std::max(normals.low(k), other.normals.low(k)),
+                          std::min(normals.high(k), other.normals.high(k)));
+        }
+        c.error = std::min(error, other.error);
+        return c;
     }
     bool operator==(const NestedCriterion&) const = default;
 };

@@ -1,0 +1,252 @@
+#include "methods/pmesh/front/resident_splits.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "base/check.h"
+
+namespace pietra::pmesh {
+
+void ResidentSplits::Blocking::clear() {
+    for (size_t k = 0; k < 3; ++k) min[k].clear(), max[k].clear();
+    error.clear();
+}
+
+void ResidentSplits::Blocking::add(const NestedCriterion& c) {
+    for (size_t k = 0; k < 3; ++k) min[k].push_back(c.min[k]), max[k].push_back(c.max[k]);
+    error.push_back(c.error);
+}
+
+ResidentSplits::ResidentSplits(SplitForest forest, uint32_t most)
+    : forest_(std::move(forest)),
+      state_(forest_.row.size()),
+      node_(forest_.row.size()),
+      most_(most),
+      limit_(most) {
+    std::vector<std::vector<Reference>> above;
+    std::vector<std::vector<SplitVertex>> before;
+    for (const SplitBase::Root& root : forest_.base.root) {
+        const Leaf first = std::exchange(leaves_, leaves_ + root.leaves);
+        if (root.split == kNoSplit) continue;
+        const NodeIndex n = nodeOfSplit(root.split);
+        if (above.size() <= n) above.resize(n + 1), before.resize(n + 1);
+        const uint32_t slot = slotOfSplit(root.split);
+        CHECK_EQ(slot, above[n].size());
+        above[n].push_back({first, root.leaves, 0, 0});
+        before[n].push_back(root.vertex);
+    }
+    above.resize(std::max<size_t>(above.size(), 1));
+    before.resize(above.size());
+    for (NodeIndex n = 0; n < forest_.row.size() && forest_.row[n].parent == kNoNode; ++n) {
+        node_[n] = placed(n, forest_.node[n], above[n], before[n]);
+        CHECK(node_[n] != nullptr);
+        node_[n]->position = uint32_t(loaded_.size());
+        loaded_.push_back(n);
+        root_criterion_.resize(splitId(n + 1, 0));
+        for (uint32_t s = 0; s < forest_.node[n].frontier; ++s)
+            root_criterion_[splitId(n, s)] = forest_.node[n].split[s].criterion;
+        for (const size_t which : {0u, 1u})
+            if (const NodeIndex c = forest_.row[n].child[which]; c != kNoNode)
+                forest_.row[c].criterion = forest_.node[n].child_criterion[which];
+    }
+    forest_.node = {};
+}
+
+/// Null where it does not fit what refers to it.
+std::unique_ptr<ResidentSplits::Loaded> ResidentSplits::placed(
+    NodeIndex index, const SplitNode& node, std::span<const Reference> above,
+    std::span<const SplitVertex> before) const {
+    if (node.frontier != above.size()) return nullptr;
+    auto loaded = std::make_unique<Loaded>();
+    const size_t count = node.split.size();
+    loaded->split.resize(count);
+    loaded->word = node.word;
+    std::vector<Leaf> first(count);
+    std::vector<SplitVertex> from(count);
+    for (uint32_t s = 0; s < node.frontier; ++s) {
+        const VertexSplit& split = node.split[s];
+        if (uint64_t(split.leaves[0]) + split.leaves[1] != above[s].leaves) return nullptr;
+        first[s] = above[s].first;
+        from[s] = before[s];
+    }
+    for (uint32_t s = 0; s < count; ++s) {
+        const VertexSplit& split = node.split[s];
+        ResidentSplit& to = loaded->split[s];
+        to.name = first[s] + split.leaves[0];
+        to.closed = (split.brings & VertexSplit::kClosed) != 0;
+        to.corner.fill(0);
+        for (size_t t = 0; t < 2; ++t) {
+            if ((split.brings >> t & 1) == 0) continue;
+            const VertexSplit::Corners& c = split.corner[t];
+            const Leaf v = first[s] + c.v, u = to.name + c.u, w = to.name + uint32_t(c.w);
+            if (v >= leaves_ || u >= leaves_ || w >= leaves_) return nullptr;
+            to.corner[3 * t] = t == 0 ? v : u;
+            to.corner[3 * t + 1] = t == 0 ? u : v;
+            to.corner[3 * t + 2] = w;
+        }
+        for (uint16_t end = 0; end < 2; ++end) {
+            // Wherever damage takes it, it is a number.
+            for (int k = 0; k < 3; ++k)
+                to.vertex[end].position[k] =
+                    int32_t(uint32_t(from[s].position[k]) + uint32_t(split.offset[end][k]));
+            to.vertex[end].normal = split.normal[end];
+            to.child[end] = kNoSplit;
+            to.criterion[end] = {};
+            if (split.child[end] == kNoChildSplit) continue;
+            const uint32_t where = split.child[end] / kSplitSlots;
+            const uint32_t slot = split.child[end] % kSplitSlots;
+            if (where == 0) {
+                to.child[end] = splitId(index, slot);
+                to.criterion[end] = node.split[slot].criterion;
+                first[slot] = end == 0 ? first[s] : to.name;
+                from[slot] = to.vertex[end];
+            } else {
+                to.child[end] = splitId(forest_.row[index].child[where - 1], slot);
+                to.criterion[end] = node.child_criterion[where - 1];
+                loaded->reference[where - 1].push_back(
+                    {end == 0 ? first[s] : to.name, split.leaves[end], uint16_t(s), end});
+            }
+        }
+    }
+    return loaded;
+}
+
+/// A row encloses those of its children, so only below what is wanted is anything wanted.
+void ResidentSplits::look(const SplitView& view) {
+    ++frame_;
+    victims_.reset();
+    blocking_.clear();
+    wanted_ = 0;
+    std::vector<NodeIndex> asked;
+    for (const NodeIndex n : loaded_) {
+        const SplitRow& row = forest_.row[n];
+        if (row.parent != kNoNode && !view.needs(row.criterion)) continue;
+        state_[n].last_used = frame_;
+        ++wanted_;
+        for (const NodeIndex c : row.child) {
+            if (c == kNoNode || isLoaded(c) || !view.needs(forest_.row[c].criterion)) continue;
+            blocking_.add(forest_.row[c].criterion);
+            if (!state_[c].is_bad) asked.push_back(c);
+        }
+    }
+    std::sort(asked.begin(), asked.end());
+    for (const NodeIndex n : asked_)
+        if (!std::binary_search(asked.begin(), asked.end(), n)) state_[n].asked = 0;
+    for (const NodeIndex n : asked) ++state_[n].asked;
+    asked_ = std::move(asked);
+}
+
+bool ResidentSplits::isBlocked(const NestedCriterion& c) const {
+    const size_t count = blocking_.error.size();
+    uint32_t found = 0;
+    for (size_t i = 0; i < count; ++i) {
+        uint16_t within = uint16_t(blocking_.error[i] >= c.error);
+        for (size_t k = 0; k < 3; ++k)
+            within &= uint16_t((blocking_.min[k][i] <= c.min[k]) &
+                               (blocking_.max[k][i] >= c.max[k]));
+        found |= within;
+    }
+    return found != 0;
+}
+
+std::vector<NodeIndex> ResidentSplits::requests(size_t most) const {
+    std::vector<NodeIndex> nodes;
+    for (const NodeIndex n : asked_)
+        if (!isLoaded(n) && !state_[n].is_bad) nodes.push_back(n);
+    std::stable_sort(nodes.begin(), nodes.end(),
+                     [&](NodeIndex a, NodeIndex b) { return state_[a].asked > state_[b].asked; });
+    nodes.resize(std::min(most, nodes.size()));
+    return nodes;
+}
+
+std::vector<NodeIndex> ResidentSplits::prefetch(const SplitView& view, size_t most) {
+    size_t room = most_ - std::min<size_t>(most_, loaded());
+    for (const NodeIndex n : loaded_)
+        room += state_[n].last_used + kFramesKept < frame_ && forest_.row[n].parent != kNoNode;
+    most = std::min(most, room);
+    // Down from the roots, level by level: rows lie so.
+    std::vector<NodeIndex> nodes, level;
+    for (NodeIndex n = 0; n < forest_.row.size() && forest_.row[n].parent == kNoNode; ++n)
+        level.push_back(n);
+    while (!level.empty() && nodes.size() < most) {
+        std::vector<NodeIndex> next;
+        for (const NodeIndex n : level)
+            for (const NodeIndex c : forest_.row[n].child) {
+                if (c == kNoNode || state_[c].is_bad || !view.needs(forest_.row[c].criterion))
+                    continue;
+                if (!isLoaded(c) && nodes.size() < most) nodes.push_back(c);
+                next.push_back(c);
+            }
+        level = std::move(next);
+    }
+    return nodes;
+}
+
+std::optional<std::vector<ResidentSplits::Arrived>> ResidentSplits::arrive(NodeIndex index,
+                                                                           const SplitNode& node) {
+    const NodeIndex parent = forest_.row[index].parent;
+    if (isLoaded(index) || state_[index].is_bad || parent == kNoNode || !isLoaded(parent))
+        return {};
+    if (!makeRoom() || !isLoaded(parent)) return {};
+    Loaded& above = *node_[parent];
+    const size_t side = forest_.row[parent].child[0] == index ? 0 : 1;
+    std::vector<SplitVertex> before;
+    for (const Reference& r : above.reference[side])
+        before.push_back(above.split[r.slot].vertex[r.end]);
+    auto loaded = placed(index, node, above.reference[side], before);
+    if (!loaded) return giveUp(index), std::nullopt;
+    std::vector<Arrived> arrived;
+    for (uint32_t s = 0; s < node.frontier; ++s) {
+        const Reference& r = above.reference[side][s];
+        above.split[r.slot].criterion[r.end] = node.split[s].criterion;
+        arrived.push_back({r.first, splitId(index, s), node.split[s].criterion});
+    }
+    for (const size_t which : {0u, 1u})
+        if (const NodeIndex c = forest_.row[index].child[which]; c != kNoNode)
+            forest_.row[c].criterion = node.child_criterion[which];
+    loaded->position = uint32_t(loaded_.size());
+    loaded_.push_back(index);
+    node_[index] = std::move(loaded);
+    ++state_[parent].loaded_children;
+    state_[index].asked = 0;
+    state_[index].last_used = frame_;
+    return arrived;
+}
+
+bool ResidentSplits::makeRoom() {
+    while (loaded() >= most_)
+        if (!evictOldest()) return false;
+    return true;
+}
+
+bool ResidentSplits::evictOldest() {
+    if (!victims_) {
+        victims_.emplace();
+        for (const NodeIndex n : loaded_)
+            if (forest_.row[n].parent != kNoNode && state_[n].last_used != frame_)
+                victims_->push_back(n);
+        // Below one that was not used nothing was.
+        std::sort(victims_->begin(), victims_->end(), [&](NodeIndex a, NodeIndex b) {
+            return std::pair(state_[a].last_used, b) > std::pair(state_[b].last_used, a);
+        });
+    }
+    while (!victims_->empty()) {
+        const NodeIndex n = victims_->back();
+        victims_->pop_back();
+        if (!mayLeave(n)) continue;
+        evict(n);
+        return true;
+    }
+    return false;
+}
+
+void ResidentSplits::evict(NodeIndex index) {
+    const uint32_t position = node_[index]->position;
+    loaded_[position] = loaded_.back();
+    node_[loaded_[position]]->position = position;
+    loaded_.pop_back();
+    node_[index].reset();
+    --state_[forest_.row[index].parent].loaded_children;
+}
+
+}  // namespace pietra::pmesh

@@ -1,0 +1,293 @@
+// The active vertices by leaves, out of core, against collapses done one by one on the input.
+
+#include "methods/pmesh/front/split_front.h"
+
+#include <random>
+
+#include "methods/pmesh/front/split_testing.h"
+#include "methods/pmesh/pmesh_testing.h"
+
+namespace pietra::pmesh {
+namespace {
+
+std::vector<TestMesh> meshes() {
+    std::vector<TestMesh> all = testMeshes();
+    all.push_back({"sheet", [] { return onLattice(test::gridShape(90, 0.1), 5000); }});
+    all.push_back({"large_ball", [] {
+                       return onLattice(dented(test::sphereShape(40), 0.01), 1 << 20);
+                   }});
+    return all;
+}
+
+struct Made {
+    explicit Made(const Mesh& mesh, uint32_t most = kSplitSlots) {
+        Budget budget(size_t(1) << 30);
+        log = logCollapses(mesh, Lattice{}, budget);
+        const LeafForest leaves = makeLeafForest(log, &leaf_of);
+        // A collapse has the name of u's first leaf.
+        for (const CollapseLog::Collapse& c : log.collapse) name.push_back(leaf_of[c.u]);
+        criterion.resize(leaves.leaves());
+        for (const LeafRoot& root : leaves.root)
+            if (root.split != kNoLeaf) criterion[root.split] = root.criterion;
+        for (const Leaf n : name)
+            for (const size_t end : {0u, 1u})
+                if (leaves.split[n].child[end] != kNoLeaf)
+                    criterion[leaves.split[n].child[end]] = leaves.split[n].criterion[end];
+        forest = ForestPacker(leaves, most).pack();
+    }
+    /// With roots only.
+    SplitForest roots() const {
+        SplitForest some = forest;
+        for (size_t n = 0; n < some.row.size(); ++n)
+            if (some.row[n].parent != kNoNode) some.node[n] = {};
+        return some;
+    }
+    CollapseLog log;
+    std::vector<Leaf> leaf_of, name;
+    std::vector<NestedCriterion> criterion;  ///< by name
+    SplitForest forest;
+};
+
+SplitView randomView(std::mt19937& random, const SplitForest& forest) {
+    const NestedCriterion& c = forest.row.front().criterion;
+    const Vec3d size(c.max[0], c.max[1], c.max[2]);
+    std::uniform_real_distribution<float> place(-0.5f, 1.5f), power(-3, 12);
+    std::normal_distribution<float> any;
+    SplitView view;
+    for (int k = 0; k < 3; ++k) view.eye[size_t(k)] = place(random) * float(size[k]);
+    view.reach = std::exp2(power(random));
+    view.hides_backs = random() % 3 == 0;
+    if (random() % 2 == 0) return view;
+    for (size_t i = 0; i < 4; ++i) {
+        const Vec3f n = glm::normalize(Vec3f(any(random), any(random), any(random)));
+        for (int k = 0; k < 3; ++k) {
+            view.side[i][size_t(k)] = n[k];
+            view.at_eye[i] += n[k] * view.eye[size_t(k)];
+        }
+    }
+    return view;
+}
+
+/// A mesh with names: first leaves.
+struct Named {
+    std::map<Leaf, SplitVertex> vertex;
+    std::vector<std::array<Leaf, 3>> triangle;
+    void add(std::array<Leaf, 3> t) {
+        std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+        triangle.push_back(t);
+    }
+    bool operator==(const Named& other) const {
+        if (triangle != other.triangle || vertex.size() != other.vertex.size()) return false;
+        return std::equal(vertex.begin(), vertex.end(), other.vertex.begin());
+    }
+};
+
+Named namedOf(const SplitFront& front, const SplitForest& forest) {
+    Named named;
+    const auto name = [&](Leaf leaf) { return front.firstLeaf(front.ownerOf(leaf)); };
+    for (uint32_t b = 0; b < front.blockCount(); ++b) {
+        Leaf last = 0;
+        for (uint32_t r = 0; r < front.countOf(b); ++r) {
+            const Leaf first = front.firstLeaf({b, r});
+            EXPECT_EQ(front.ownerOf(first), (SplitFront::Place{b, r}));
+            EXPECT_TRUE(r == 0 || first > last);
+            last = first;
+            const SplitFront::Slot slot = front.slotAt({b, r});
+            EXPECT_EQ(slot.page.first[slot.i], first);
+            EXPECT_TRUE(named.vertex.emplace(first, slot.page.vertex[slot.i]).second);
+            const auto& leaf = slot.page.leaf[slot.i];
+            for (size_t t = 0; t < 6; t += 3)
+                if (leaf[t] != leaf[t + 1])
+                    named.add({name(leaf[t]), name(leaf[t + 1]), name(leaf[t + 2])});
+        }
+    }
+    for (const auto& t : forest.base.triangle) named.add({name(t[0]), name(t[1]), name(t[2])});
+    std::sort(named.triangle.begin(), named.triangle.end());
+    EXPECT_EQ(named.vertex.size(), front.vertexCount());
+    EXPECT_EQ(named.triangle.size(), front.triangleCount());
+    return named;
+}
+
+/// All collapses but some, in their order. Each must find the very star that it had when everything
+/// was collapsed.
+Named collapsed(const Made& made, const std::vector<bool>& undone) {
+    const size_t count = made.log.vertex.size();
+    std::vector<uint32_t> into(count);
+    for (uint32_t v = 0; v < count; ++v) into[v] = v;
+    std::vector<Vertex> now = made.log.vertex;
+    std::vector<Triangle> triangle = made.log.triangle;
+    std::vector<std::set<uint32_t>> around(count);
+    for (uint32_t t = 0; t < triangle.size(); ++t)
+        for (const uint32_t v : triangle[t]) around[v].insert(t);
+    for (size_t i = 0; i < made.log.collapse.size(); ++i) {
+        const CollapseLog::Collapse& c = made.log.collapse[i];
+        if (undone[i]) continue;
+        EXPECT_EQ(now[c.v], c.before[0]);
+        EXPECT_EQ(now[c.u], c.before[1]);
+        std::set<uint32_t> ring, gone;
+        for (const uint32_t end : {c.v, c.u})
+            for (const uint32_t t : around[end])
+                for (const uint32_t w : triangle[t]) {
+                    if (w != c.v && w != c.u) ring.insert(w);
+                    if (w != end && (w == c.v || w == c.u)) gone.insert(t);
+                }
+        EXPECT_EQ(ring, std::set<uint32_t>(c.neighbour.begin(), c.neighbour.begin() +
+                                                                    c.neighbours));
+        EXPECT_EQ(gone,
+                  std::set<uint32_t>(c.triangle.begin(), c.triangle.begin() + c.triangles));
+        for (const uint32_t t : gone)
+            for (const uint32_t w : triangle[t]) around[w].erase(t);
+        for (const uint32_t t : around[c.u]) {
+            for (uint32_t& w : triangle[t])
+                if (w == c.u) w = c.v;
+            around[c.v].insert(t);
+        }
+        around[c.u].clear();
+        into[c.u] = c.v;
+        now[c.v] = c.after;
+    }
+    Named named;
+    for (uint32_t v = 0; v < count; ++v)
+        if (into[v] == v)
+            named.vertex[made.leaf_of[v]] = {now[v].position(), uint16_t(now[v].normal)};
+    std::set<uint32_t> left;
+    for (const auto& a : around) left.insert(a.begin(), a.end());
+    for (const uint32_t t : left)
+        named.add({made.leaf_of[triangle[t][0]], made.leaf_of[triangle[t][1]],
+                   made.leaf_of[triangle[t][2]]});
+    std::sort(named.triangle.begin(), named.triangle.end());
+    return named;
+}
+
+std::vector<bool> neededBy(const Made& made, const SplitView& view) {
+    std::vector<bool> needed;
+    for (const Leaf name : made.name) needed.push_back(view.needs(made.criterion[name]));
+    return needed;
+}
+
+/// The splits that are applied.
+std::vector<bool> appliedIn(const Made& made, const SplitFront& front) {
+    std::vector<bool> applied;
+    for (const Leaf name : made.name) {
+        const SplitFront::Place p = front.ownerOf(name);
+        applied.push_back(front.firstLeaf(p) == name);
+    }
+    return applied;
+}
+
+class EachForest : public testing::TestWithParam<TestMesh> {};
+INSTANTIATE_TEST_SUITE_P(SplitFront, EachForest, testing::ValuesIn(meshes()),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST_P(EachForest, EveryViewIsTheInputWithWhatItDoesNotNeedCollapsed) {
+    const Made made(GetParam().make(), 40);
+    ResidentSplits nodes(made.forest, ~0u);
+    // All nodes there are.
+    std::mt19937 random(5);
+    std::vector<SplitView> views{wholeSplitView(true), wholeSplitView(false), wholeSplitView(true)};
+    for (int i = 0; i < 20; ++i) views.push_back(randomView(random, made.forest));
+    views.push_back(wholeSplitView(false));
+    SplitView slow = randomView(random, made.forest);
+    for (slow.reach = 0.5f; slow.reach < 8000; slow.reach *= 1.15f) views.push_back(slow);
+    for (int i = 0; i < 20; ++i) {
+        slow.eye[0] += 3;
+        views.push_back(slow);
+    }
+    for (NodeIndex n = 0; n < made.forest.row.size(); ++n)
+        if (made.forest.row[n].parent != kNoNode) {
+            ASSERT_TRUE(nodes.arrive(n, made.forest.node[n]));
+        }
+    SplitFront front(nodes);
+    uint32_t before = 0, mixed = 0;
+    for (const SplitView& view : views) {
+        nodes.look(view);
+        EXPECT_EQ(nodes.missing(), 0u);
+        const FrontCounts counts = front.adapt(view);
+        const std::vector<bool> needed = neededBy(made, view);
+        const auto undone = uint32_t(std::count(needed.begin(), needed.end(), true));
+        EXPECT_TRUE(namedOf(front, made.forest) == collapsed(made, needed));
+        EXPECT_EQ(before + counts.splits - counts.merges, undone);
+        mixed += undone > 0 && undone < made.log.collapse.size();
+        before = undone;
+        EXPECT_EQ(front.toDo(view), 0u);
+        EXPECT_EQ(front.adapt(view).operations(), 0u);
+        if (HasFailure()) return;
+    }
+    EXPECT_TRUE(mixed > 5 || made.log.collapse.size() < 100);
+}
+
+/// Nodes come late, in any order, and leave; the mesh is one that collapses reach, and once all has
+/// come, the one that is needed. Limits hold.
+TEST_P(EachForest, WhateverIsThereEveryFrameIsOneMesh) {
+    const Made made(GetParam().make(), 40);
+    std::mt19937 random(11);
+    uint32_t waited = 0, limited = 0;
+    for (const uint32_t most : {~0u, 30u}) {
+        ResidentSplits nodes(made.roots(), uint32_t(made.forest.row.size()));
+        nodes.setMost(most);
+        SplitFront front(nodes);
+        SplitView view = randomView(random, made.forest);
+        for (int frame = 0; frame < 120; ++frame) {
+            if (frame % 20 == 0) view = randomView(random, made.forest);
+            if (frame % 20 < 5) view.eye[1] += 50;
+            nodes.look(view);
+            FrontLimits limits;
+            if (frame / 20 % 3 == 1) limits.splits = 60;
+            if (frame / 20 % 3 == 2) limits.vertices = made.forest.base.root.size() + 300;
+            const size_t vertices = front.vertexCount();
+            const FrontCounts counts = front.adapt(view, limits);
+            EXPECT_LE(front.vertexCount(), std::max(vertices, limits.vertices));
+            EXPECT_LE(counts.splits, std::max<size_t>(limits.splits, 1) + 200 * (limits.splits < 100));
+            limited += counts.short_of_splits || counts.short_of_vertices;
+            const std::vector<bool> applied = appliedIn(made, front);
+            EXPECT_TRUE(namedOf(front, made.forest) == collapsed(made, applied));
+            const std::vector<bool> needed = neededBy(made, view);
+            for (size_t i = 0; i < applied.size(); ++i) EXPECT_LE(applied[i], needed[i]);
+            waited += nodes.missing() > 0;
+            if (nodes.missing() == 0 && !counts.short_of_splits && !counts.short_of_vertices) {
+                EXPECT_EQ(applied, needed);
+            }
+            if (HasFailure()) return;
+            std::vector<NodeIndex> asked = nodes.requests(1 + random() % 4);
+            std::shuffle(asked.begin(), asked.end(), random);
+            for (const NodeIndex n : asked)
+                if (const auto arrived = nodes.arrive(n, made.forest.node[n])) front.arrived(*arrived);
+            EXPECT_LE(nodes.loaded(), std::max<size_t>(most, 1));
+            if (random() % 8 == 0) nodes.evictOldest();
+        }
+    }
+    EXPECT_TRUE(made.log.collapse.size() < 300 || (waited > 10 && limited > 0));
+}
+
+TEST(SplitFront, TheNumberOfThreadsDoesNotShow) {
+    const Made made(onLattice(dented(test::sphereShape(80), 0.01), 1 << 20));
+    std::vector<std::vector<std::byte>> memory;
+    for (const int jobs : {1, 2, 7}) {
+        const ThreadLimit limit(jobs);
+        ResidentSplits nodes(made.forest, ~0u);
+        for (NodeIndex n = 0; n < made.forest.row.size(); ++n)
+            if (made.forest.row[n].parent != kNoNode) {
+                ASSERT_TRUE(nodes.arrive(n, made.forest.node[n]));
+            }
+        SplitFront front(nodes);
+        std::mt19937 random(9);
+        std::vector<std::byte>& bytes = memory.emplace_back();
+        for (int i = 0; i < 20; ++i) {
+            const SplitView view = randomView(random, made.forest);
+            nodes.look(view);
+            front.adapt(view);
+            for (uint32_t b = 0; b < front.blockCount(); ++b)
+                for (uint32_t r = 0; r < front.countOf(b); ++r) {
+                    const SplitFront::Slot slot = front.slotAt({b, r});
+                    const std::array<uint32_t, 3> some{b, slot.i, slot.page.first[slot.i]};
+                    const auto all = std::as_bytes(std::span(some));
+                    bytes.insert(bytes.end(), all.begin(), all.end());
+                }
+        }
+    }
+    EXPECT_TRUE(memory[0] == memory[1]);
+    EXPECT_TRUE(memory[0] == memory[2]);
+}
+
+}  // namespace
+}  // namespace pietra::pmesh
