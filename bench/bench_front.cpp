@@ -14,6 +14,8 @@
 #include "clock.h"
 #include "methods/pmesh/adaption.h"
 #include "methods/pmesh/front/leaf_front.h"
+#include "methods/pmesh/front/split_front.h"
+#include "methods/pmesh/front/split_testing.h"
 #include "methods/pmesh/in_core_builder.h"
 #include "methods/pmesh/whole_mesh.h"
 #include "pmesh_views.h"
@@ -51,8 +53,8 @@ struct Sum {
     }
 };
 
-void storm(LeafFront& front, const LeafForest& forest, Adaption& adaption, const Box3d& box,
-           double pixels) {
+void storm(LeafFront& front, const LeafForest& forest, ResidentSplits& nodes, SplitFront& split,
+           const Box3d& box, double pixels) {
     const int frames = 24;
     std::array<Sum, 2> best;
     const auto camera = [&](int f) { return stormCamera(box, forest.lattice, f); };
@@ -66,16 +68,20 @@ void storm(LeafFront& front, const LeafForest& forest, Adaption& adaption, const
         }
         for (int f = 0; f <= frames; ++f) {
             if (f == 1) sum[1] = {};
-            const Criterion criterion = criterionOf(camera(f), forest.lattice, pixels);
-            sum[1].add([&] { return adaption.settle(criterion).operations(); });
-            sum[1].addSize(adaption.mesh().vertexCount(), adaption.mesh().faceCount());
+            const SplitView view =
+                splitView(camera(f), forest.lattice, nodes.forest().grid, pixels);
+            sum[1].add([&] {
+                nodes.look(view);
+                return split.adapt(view).operations();
+            });
+            sum[1].addSize(split.vertexCount(), split.triangleCount());
         }
         for (size_t i = 0; i < 2; ++i)
             if (round == 0 || sum[i].cpu < best[i].cpu) best[i] = sum[i];
     }
     std::printf("  storm at %.2f px\n", pixels);
     best[0].print("by leaves", frames);
-    best[1].print("by stars ", frames);
+    best[1].print("by splits", frames);
 }
 
 void hover(LeafFront& front, const LeafForest& forest, const Box3d& box, double pixels) {
@@ -119,10 +125,37 @@ void run(const char* path) {
             sum.print(all ? "refine all " : "coarsen all", 1);
         }
     for (const double pixels : {1.0, 0.25, 0.1}) hover(front, forest, box, pixels);
-    const ProgressiveMesh mesh =
-        fromNodes(buildInCore(std::move(whole.mesh), whole.lattice, budget));
-    Adaption adaption(mesh);
-    for (const double pixels : {0.25, 0.1}) storm(front, forest, adaption, box, pixels);
+    SplitForest packed = ForestPacker(forest).pack();
+    const std::vector<SplitNode> node = packed.node;
+    ResidentSplits nodes(std::move(packed), ~0u);
+    for (NodeIndex n = 0; n < node.size(); ++n)
+        if (nodes.forest().row[n].parent != kNoNode && !nodes.arrive(n, node[n])) std::abort();
+    SplitFront split(nodes);
+    for (int i = 0; i < 3; ++i)
+        for (const bool all : {true, false}) {
+            Sum sum;
+            sum.add([&] {
+                nodes.look(wholeSplitView(all));
+                return split.adapt(wholeSplitView(all)).operations();
+            });
+            sum.addSize(split.vertexCount(), split.triangleCount());
+            sum.print(all ? "splits: refine all " : "splits: coarsen all", 1);
+        }
+    for (const double pixels : {1.0, 0.25, 0.1}) {
+        std::vector<double> ns;
+        for (int frame = 0; frame <= 200; ++frame) {
+            const SplitView v = splitView(cameraFrom(box, forest.lattice, 2 + 1e-5 * frame, 0.4),
+                                          forest.lattice, nodes.forest().grid, pixels);
+            const double begin = processSeconds();
+            nodes.look(v);
+            split.adapt(v);
+            ns.push_back((processSeconds() - begin) * 1e9 / double(split.vertexCount()));
+        }
+        std::sort(ns.begin(), ns.end());
+        std::printf("  splits: hover at %.2f px: %zu vertices: median %.2f ns a vertex\n", pixels,
+                    split.vertexCount(), ns[100]);
+    }
+    for (const double pixels : {1.0, 0.25, 0.1}) storm(front, forest, nodes, split, box, pixels);
 }
 
 }  // namespace

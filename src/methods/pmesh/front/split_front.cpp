@@ -287,8 +287,8 @@ size_t SplitFront::countSplits(const SplitView& view, size_t enough) {
 }
 
 /// The same, or one of a coarser tolerance: what that needs is a closed set, too.
-SplitView SplitFront::withinLimits(const SplitView& view, const FrontLimits& limits,
-                                   FrontCounts& counts) {
+SplitView SplitFront::withinLimits(const SplitView& view, const SplitLimits& limits,
+                                   SplitCounts& counts) {
     const size_t room = limits.vertices - std::min(limits.vertices, vertices_);
     const size_t most = std::min(room, limits.splits);
     const size_t roots = nodes_.forest().base.root.size();
@@ -400,8 +400,8 @@ void SplitFront::openIfNeeded(Block& b, uint32_t slot, const SplitView& view) {
     b.queue.push_back(uint16_t(slot));
 }
 
-FrontCounts SplitFront::adapt(const SplitView& keep, const FrontLimits& limits) {
-    FrontCounts counts;
+SplitCounts SplitFront::adapt(const SplitView& keep, const SplitLimits& limits) {
+    SplitCounts counts;
     blocks_ = nodes_.anyBlocks();
     const auto forBlocks = [&](auto&& body) {
         parallelForSlices(block_.size(), kBatch, [&](size_t begin, size_t end) {

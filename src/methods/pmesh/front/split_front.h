@@ -29,12 +29,12 @@
 
 namespace pietra::pmesh {
 
-struct FrontLimits {
+struct SplitLimits {
     size_t vertices = ~size_t(0);  ///< never more, but for those that there are
     size_t splits = ~size_t(0);    ///< in this frame
 };
 
-struct FrontCounts {
+struct SplitCounts {
     uint32_t splits = 0, merges = 0, rounds = 0;
     /// Something needed and not blocked was left out for a limit; what is done is what a view of a
     /// coarser tolerance needs.
@@ -48,7 +48,7 @@ public:
     explicit SplitFront(const ResidentSplits& nodes);
 
     /// `nodes` must have looked at this view.
-    FrontCounts adapt(const SplitView& view, const FrontLimits& limits = {});
+    SplitCounts adapt(const SplitView& view, const SplitLimits& limits = {});
     /// How many vertices adapt() would begin with to split or to merge: 0 if there is nothing to do.
     size_t toDo(const SplitView& view) const;
     /// What these vertices wait for has arrived.
@@ -162,7 +162,7 @@ private:
     void merge(uint32_t block, Deferred& deferred);
     void applyMerge(const Merge& m);
     size_t countSplits(const SplitView& view, size_t enough);
-    SplitView withinLimits(const SplitView& view, const FrontLimits& limits, FrontCounts& counts);
+    SplitView withinLimits(const SplitView& view, const SplitLimits& limits, SplitCounts& counts);
     void fillQueue(Block& b);
     void prefetch(const Block& b, uint32_t slot) const;
     void splitAll(uint32_t block, const SplitView& view, Deferred& deferred);

@@ -202,7 +202,7 @@ TEST_P(EachForest, EveryViewIsTheInputWithWhatItDoesNotNeedCollapsed) {
     for (const SplitView& view : views) {
         nodes.look(view);
         EXPECT_EQ(nodes.missing(), 0u);
-        const FrontCounts counts = front.adapt(view);
+        const SplitCounts counts = front.adapt(view);
         const std::vector<bool> needed = neededBy(made, view);
         const auto undone = uint32_t(std::count(needed.begin(), needed.end(), true));
         EXPECT_TRUE(namedOf(front, made.forest) == collapsed(made, needed));
@@ -231,11 +231,11 @@ TEST_P(EachForest, WhateverIsThereEveryFrameIsOneMesh) {
             if (frame % 20 == 0) view = randomView(random, made.forest);
             if (frame % 20 < 5) view.eye[1] += 50;
             nodes.look(view);
-            FrontLimits limits;
+            SplitLimits limits;
             if (frame / 20 % 3 == 1) limits.splits = 60;
             if (frame / 20 % 3 == 2) limits.vertices = made.forest.base.root.size() + 300;
             const size_t vertices = front.vertexCount();
-            const FrontCounts counts = front.adapt(view, limits);
+            const SplitCounts counts = front.adapt(view, limits);
             EXPECT_LE(front.vertexCount(), std::max(vertices, limits.vertices));
             EXPECT_LE(counts.splits, std::max<size_t>(limits.splits, 1) + 200 * (limits.splits < 100));
             limited += counts.short_of_splits || counts.short_of_vertices;
