@@ -17,6 +17,9 @@ struct BlobHeader {
     uint8_t has_bounds;   // else all are `bound`
     uint8_t has_colours;
     uint8_t closed;
+    uint8_t corner_bytes;  // of each number; 0: there are none, or all are 0
+    uint8_t has_corners;
+    uint16_t unused;
     float bound;
 };
 
@@ -31,6 +34,12 @@ public:
         if (count) std::memcpy(out_.data() + begin, data, count * sizeof(T));
     }
 
+    void putBytes(const void* data, size_t bytes) {
+        const size_t begin = out_.size();
+        out_.resize(begin + bytes);
+        std::memcpy(out_.data() + begin, data, bytes);
+    }
+
 private:
     std::vector<std::byte>& out_;
 };
@@ -43,6 +52,12 @@ public:
         CHECK_LE(count * sizeof(T), in_.size());
         if (count) std::memcpy(data, in_.data(), count * sizeof(T));
         in_ = in_.subspan(count * sizeof(T));
+    }
+    /// Of little endian numbers the lower ones.
+    void getBytes(void* data, size_t bytes) {
+        CHECK_LE(bytes, in_.size());
+        std::memcpy(data, in_.data(), bytes);
+        in_ = in_.subspan(bytes);
     }
     template <class T>
     void get(std::vector<T>& data, size_t count) {
@@ -81,6 +96,10 @@ CellBlob CellStore::put(const CellMesh& cell) {
     header.has_colours = !mesh.colour.empty();
     header.closed = cell.closed;
     header.bound = first;
+    header.has_corners = !cell.corner.empty();
+    uint32_t largest = 0;
+    for (const auto& row : cell.corner) largest = std::max({largest, row[0], row[1], row[2]});
+    header.corner_bytes = largest == 0 ? 0 : largest < 1 << 8 ? 1 : largest < 1 << 16 ? 2 : 4;
 
     std::vector<std::byte>& out = scratch<std::byte>();
     Packer pack(out);
@@ -104,6 +123,8 @@ CellBlob CellStore::put(const CellMesh& cell) {
         pack.put(mesh.triangle.data(), mesh.triangle.size());
     }
     if (header.has_classes) pack.put(mesh.edge_class.data(), mesh.edge_class.size());
+    for (const auto& row : cell.corner)
+        for (const uint32_t n : row) pack.putBytes(&n, header.corner_bytes);
     CHECK_LT(out.size(), size_t(1) << 32);
     return {this, spill_.append(out), uint32_t(out.size()), header.triangles};
 }
@@ -145,6 +166,9 @@ void CellStore::get(const CellBlob& blob, CellMesh& cell) const {
         unpack.get(mesh.edge_class, header.triangles);
     else
         mesh.edge_class.assign(header.triangles, 0);
+    cell.corner.assign(header.has_corners ? header.triangles : 0, {});
+    for (auto& row : cell.corner)
+        for (uint32_t& n : row) unpack.getBytes(&n, header.corner_bytes);
 }
 
 }  // namespace pietra

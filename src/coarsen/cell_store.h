@@ -3,6 +3,7 @@
 // and simplified cells leave behind for the next coarser level, packed, in temporary space.
 // Thread-safe.
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -18,6 +19,8 @@ struct CellMesh {
     Mesh mesh;
     FaceBounds bounds;
     bool closed = false;  ///< all belong to closed, consistently oriented components
+    /// A method's own: a number a corner, one row a triangle; or none.
+    std::vector<std::array<uint32_t, 3>> corner{};
 };
 
 class CellStore;

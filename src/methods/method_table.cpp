@@ -5,8 +5,8 @@
 #include "base/error.h"
 #include "methods/cluster/build.h"
 #include "methods/pmesh/build.h"
-#include "methods/pmesh/live_mesh.h"
-#include "methods/pmesh/model.h"
+#include "methods/pmesh/front/split_live.h"
+#include "methods/pmesh/split_model.h"
 #include "methods/tetra/build.h"
 
 namespace pietra {

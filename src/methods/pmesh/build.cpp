@@ -4,8 +4,9 @@
 
 #include "construction/construction.h"
 #include "methods/pmesh/diamond_collapses.h"
-#include "methods/pmesh/encoder.h"
-#include "methods/pmesh/node_codec.h"
+#include "methods/pmesh/split_codec.h"
+#include "methods/pmesh/split_encoder.h"
+#include "methods/pmesh/split_faults.h"
 
 namespace pietra::pmesh {
 namespace {
@@ -16,12 +17,11 @@ class PageSpill {
 public:
     explicit PageSpill(TempSpace& space) : pages_(space), entries_(space) {}
 
-    void add(NodeIndex n, const NodeRow& row, const OperationNode& node, int lattice_shift) {
-        const std::vector<std::byte> page = encodeNode(node);
-        const Entry entry{tableNode(n, row, node, lattice_shift), pages_.append(page), page.size()};
+    void add(NodeIndex n, const Node& node, std::span<const std::byte> page) {
+        const Entry entry{node, pages_.append(page), page.size()};
         entries_.write(n * sizeof entry, std::as_bytes(std::span(&entry, 1)));
-        if (of_level_.size() <= row.level) of_level_.resize(row.level + 1u);
-        ++of_level_[row.level];
+        if (of_level_.size() <= node.level) of_level_.resize(node.level + 1u);
+        ++of_level_[node.level];
     }
 
     /// Fine to coarse.
@@ -63,26 +63,31 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
     ModelInfo info = work.info();
 
     BuildCounts counts;
-    NodeForest forest;
+    SplitForest forest;
+    std::vector<Sphere> spheres;
     PageSpill pages(work.space);
     {
         Collapses collapses(work.space);
         collapseByDiamonds(work, settings, progress, collapses);
         progress.beginStage("encode", collapses.store.size());
-        forest = encode(collapses, info.lattice, work.space, counts,
-                        [&](NodeIndex n, const NodeRow& row, const OperationNode& node) {
-                            pages.add(n, row, node, info.lattice.shift);
-                            progress.tick(node.operation.size());
-                        });
+        forest = encodeSplits(
+            collapses, info.lattice, work.space, counts,
+            [&](NodeIndex n, const SplitRow& row, const SplitGrid& grid, SplitNode& node) {
+                spheres.resize(std::max<size_t>(spheres.size(), n + 1));
+                std::vector<Sphere> below;
+                for (const NodeIndex c : row.child)
+                    if (c != kNoNode) below.push_back(spheres[c]);
+                const Node entry = tableNode(n, row, node, info.lattice, grid, below);
+                spheres[n] = entry.saturated;
+                pages.add(n, entry, encodeSplitNode(node));
+                progress.tick(node.split.size());
+            });
     }
     report.levels = counts.levels;
-    // The finest mesh is the input but for the lattice and what offsets cannot tell.
-    const double rounding = double(counts.largest_error) * double(1 << info.lattice.shift);
-    info.quantisation_error = float(double(info.quantisation_error) + 1.7320509 * rounding);
-    progress.beginStage("write", counts.operations / kNodeSlots);
+    progress.beginStage("write", counts.operations / kSplitSlots);
     pages.write(work.writer, progress);
     report.nodes = work.writer.nodeCount();
-    work.writer.finish(info, {.method_format = kMethodFormat}, encodeBase(forest));
+    work.writer.finish(info, {.method_format = kMethodFormat}, encodeSplitBase(forest));
     progress.endStage();
     work.finish(report);
     return report;

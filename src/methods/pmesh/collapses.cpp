@@ -5,18 +5,16 @@ namespace pietra::pmesh {
 void CollapseStore::append(std::span<const CollapseLink> links,
                            std::span<const CollapseRecord> records,
                            std::span<const uint32_t> number, std::span<const uint32_t> words) {
-    std::vector<CollapseShape> shapes;
-    std::vector<uint32_t> rings;
+    std::vector<CollapseShape> shapes(records.begin(), records.end());
+    std::vector<Wings> wings;
     for (const CollapseRecord& r : records) {
-        const uint32_t record = size_ + uint32_t(shapes.size());
-        shapes.push_back(r);
-        if (!r.closed) continue;
-        rings.insert(rings.end(), {record, r.ring_size});
-        for (uint8_t k = 0; k < r.ring_size; ++k) rings.push_back(number[r.ring[k]]);
+        wings.push_back(r.wing);
+        for (CollapseWing& w : wings.back())
+            if (w.vertex != kNoVertex) w.vertex = number[w.vertex];
     }
     links_.append(std::as_bytes(links));
     shapes_.append(std::as_bytes(std::span(shapes)));
-    rings_.append(std::as_bytes(std::span(rings)));
+    wings_.append(std::as_bytes(std::span(wings)));
     words_.append(std::as_bytes(words));
     size_ += uint32_t(records.size());
 }
@@ -29,7 +27,7 @@ void CollapseStore::readWords(uint32_t i, WordLayout layout, std::vector<uint32_
 }
 
 void CollapseStore::save(StateWriter& state) {
-    for (Spill* spill : {&links_, &shapes_, &rings_, &aliases_, &words_}) {
+    for (Spill* spill : {&links_, &shapes_, &wings_, &aliases_, &words_}) {
         spill->save();
         state.put(spill->bytes());
     }
@@ -37,7 +35,7 @@ void CollapseStore::save(StateWriter& state) {
 }
 
 void CollapseStore::restore(StateReader& state) {
-    for (Spill* spill : {&links_, &shapes_, &rings_, &aliases_, &words_})
+    for (Spill* spill : {&links_, &shapes_, &wings_, &aliases_, &words_})
         spill->restore(state.get<uint64_t>());
     state.get(size_);
 }

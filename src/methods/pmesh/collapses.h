@@ -25,16 +25,19 @@ struct VertexAlias {
     uint64_t number;
 };
 
+/// Both of a collapse; the third vertices as numbers.
+using Wings = std::array<CollapseWing, 2>;
+
 class CollapseStore {
 public:
     explicit CollapseStore(TempSpace& space)
         : links_(space, "links"),
           shapes_(space, "shapes"),
-          rings_(space, "rings"),
+          wings_(space, "wings"),
           aliases_(space, "aliases"),
           words_(space, "words") {}
 
-    /// Of one diamond. `number`: of the vertices that the rings mean; in the links, `u` is an id.
+    /// Of one diamond. `number`: of the vertices that the wings mean; in the links, `u` is an id.
     /// `words`: Recorder::words().
     void append(std::span<const CollapseLink> links, std::span<const CollapseRecord> records,
                 std::span<const uint32_t> number, std::span<const uint32_t> words = {});
@@ -48,18 +51,18 @@ public:
     CachedRecords<CollapseLink> links() const { return CachedRecords<CollapseLink>(links_); }
     CachedRecords<CollapseShape> shapes() const { return CachedRecords<CollapseShape>(shapes_); }
 
+    CachedRecords<Wings> wings() const { return CachedRecords<Wings>(wings_); }
+
     /// Appends those of a collapse.
     void readWords(uint32_t i, WordLayout layout, std::vector<uint32_t>& words) const;
 
-    /// visit(record, std::span<const uint32_t>), in order, for each ring that is closed.
+    /// visit(record, Wings), in order.
     template <class Visit>
-    void forEachClosedRing(Visit&& visit) const {
-        forWindows<uint32_t>(rings_, [&](std::span<const uint32_t> window) {
-            size_t i = 0;
-            for (; i + 1 < window.size() && i + 1 + window[i + 1] < window.size();
-                 i += 2 + window[i + 1])
-                visit(window[i], window.subspan(i + 2, window[i + 1]));
-            return i;
+    void forEachWings(Visit&& visit) const {
+        uint32_t record = 0;
+        forWindows<Wings>(wings_, [&](std::span<const Wings> window) {
+            for (const Wings& wings : window) visit(record++, wings);
+            return window.size();
         });
     }
     template <class Visit>
@@ -83,7 +86,7 @@ private:
     }
 
     Spill links_, shapes_;
-    Spill rings_;  // record, size, numbers
+    Spill wings_;
     Spill aliases_;
     Spill words_;
     uint32_t size_ = 0;
@@ -94,11 +97,11 @@ struct Collapses {
     CollapseStore store;
     Mesh base;
     std::vector<uint8_t> base_closed;  ///< one a triangle: 1 is surely of a closed component
+    std::vector<FaceLeaves> base_leaves;  ///< of its triangles
     std::vector<VertexId> base_vertex;
-    std::vector<uint32_t> base_last;  ///< the record each came from last, or kNoOperation
+    std::vector<uint32_t> base_last;  ///< the record each came from last, or kNoSplit
     uint32_t numbers = 0;             ///< of vertices, all are below
     uint32_t largest_height = 0;
-    uint64_t dummies = 0;
     Recorder::Refused refused;
 };
 

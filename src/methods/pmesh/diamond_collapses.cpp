@@ -78,7 +78,7 @@ struct DiamondResult {
     std::vector<uint8_t> inside;  ///< Recorder::isInside()
     int height = 0;               ///< of the cells
     uint32_t largest_height = 0;
-    uint64_t dummies = 0, input_triangles = 0;
+    uint64_t input_triangles = 0;
     Recorder::Refused refused;
 };
 
@@ -111,6 +111,7 @@ public:
         label_.clear();
         bound_.clear();
         closed_.clear();
+        leaves_.clear();
         state_.clear();
         ids_.reserve(0);
     }
@@ -132,6 +133,7 @@ private:
     std::vector<uint8_t> label_;
     std::vector<float> bound_;     // one a triangle
     std::vector<uint8_t> closed_;  // likewise: of a closed component (coarsen/components.h)
+    std::vector<FaceLeaves> leaves_;
     std::vector<VertexState> state_;
     KeyMap ids_;
     std::vector<uint32_t> local_;
@@ -166,6 +168,7 @@ void Collapser::add(const CellMesh& cell, bool is_leaf, uint8_t label) {
         // What the lattice took is no part of it.
         bound_.push_back(is_leaf ? 0 : cell.bounds.to_original[t]);
         closed_.push_back(is_leaf ? cell.closed : cell.bounds.from_original[t] != 0);
+        leaves_.push_back(is_leaf ? FaceLeaves{} : cell.corner[t]);
     }
 }
 
@@ -179,7 +182,7 @@ void Collapser::run(std::span<const uint32_t> quota, float child_error,
     }
     std::vector<VertexHistory> history;
     for (const VertexState& state : state_) history.push_back(state.history);
-    Recorder recorder(mesh_, std::move(history), bound_, closed_, effort, kLocal, shift_);
+    Recorder recorder(mesh_, std::move(history), bound_, leaves_, closed_, effort, kLocal, shift_);
     if (std::any_of(quota.begin(), quota.end(), [](uint32_t q) { return q > 0; }))
         recorder.limitHeights(kMostHeights);
     SimplifyInput input;
@@ -199,7 +202,6 @@ void Collapser::run(std::span<const uint32_t> quota, float child_error,
     result.vertex = state_;
     for (uint32_t v = 0; v < state_.size(); ++v) result.inside.push_back(recorder.isInside(v));
     result.largest_height = recorder.largestHeight();
-    result.dummies = recorder.dummies();
     result.refused = recorder.refused();
 }
 
@@ -210,8 +212,7 @@ void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult&
     std::vector<uint32_t> slot(mesh.triangleCount());
     for (uint32_t t = 0; t < mesh_.triangleCount(); ++t)
         if (simplified_.triangle_map[t] != kNone) slot[simplified_.triangle_map[t]] = t;
-    for (const CollapseLink& link : recorder.links())
-        if (link.u != CollapseLink::kNone) gone[link.u] = 1;
+    for (const CollapseLink& link : recorder.links()) gone[link.u] = 1;
     for (uint32_t v = 0; v < state_.size(); ++v)
         if (!gone[v] && simplified_.vertex_map[v] != kNone) {
             CHECK_EQ(survivor[simplified_.vertex_map[v]], kNoVertex);
@@ -249,6 +250,7 @@ void Collapser::takeApart(const Recorder& recorder, size_t cells, DiamondResult&
             result.cells[c].bounds.to_original.push_back(bound);
             // One number is for both directions (surface_map.h): the other one's place is free.
             result.cells[c].bounds.from_original.push_back(recorder.isClosed(slot[t]));
+            result.cells[c].corner.push_back(recorder.leavesOf(slot[t]));
             result.errors[c] = std::max(result.errors[c], bound);
         }
     }
@@ -301,7 +303,7 @@ private:
     }
     void take(DiamondResult& result);
     static uint32_t globalRecord(uint32_t record, uint32_t first) {
-        return record == kNoOperation || record < kLocal ? record : first + (record - kLocal);
+        return record == kNoSplit || record < kLocal ? record : first + (record - kLocal);
     }
 
     static constexpr uint64_t kTrimEvery = 32;  // diamonds
@@ -353,7 +355,6 @@ void LevelCollapser::save(int level, StateWriter& state) {
     out_.store.save(state);
     state.put(out_.numbers);
     state.put(out_.largest_height);
-    state.put(out_.dummies);
     state.put(out_.refused);
 }
 
@@ -372,7 +373,6 @@ int LevelCollapser::restore(StateReader& state) {
     out_.store.restore(state);
     state.get(out_.numbers);
     state.get(out_.largest_height);
-    state.get(out_.dummies);
     state.get(out_.refused);
     return level - 1;
 }
@@ -417,7 +417,7 @@ void LevelCollapser::take(DiamondResult& result) {
         number.push_back(state.number);
     }
     for (CollapseLink& link : result.link) {
-        if (link.u != CollapseLink::kNone) link.u = result.vertex[link.u].id();
+        link.u = result.vertex[link.u].id();
         for (uint32_t& child : link.child) child = globalRecord(child, first);
     }
     out_.store.append(result.link, result.record, number, result.words);
@@ -434,7 +434,6 @@ void LevelCollapser::take(DiamondResult& result) {
         cells_[result.ids[c]] = {store_->put(result.cells[c]), result.errors[c], result.height};
     }
     out_.largest_height = std::max(out_.largest_height, result.largest_height);
-    out_.dummies += result.dummies;
     out_.refused.irregular += result.refused.irregular;
     out_.refused.valence += result.refused.valence;
     out_.refused.level += result.refused.level;
@@ -462,6 +461,7 @@ void LevelCollapser::runRoot() {
     take(result);
     const std::vector<float>& closed = result.cells[0].bounds.from_original;
     out_.base_closed.assign(closed.begin(), closed.end());
+    out_.base_leaves = std::move(result.cells[0].corner);
     out_.base = std::move(result.cells[0].mesh);
     spreadOverEdges(out_.base, out_.base_closed);
     std::vector<float> scalars;

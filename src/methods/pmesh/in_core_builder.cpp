@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "methods/pmesh/encoder.h"
+#include "methods/pmesh/split_encoder.h"
 #include "methods/pmesh/twins.h"
 #include "simplify/simplify.h"
 
@@ -47,16 +47,19 @@ SimplifyOutput collapseAll(const Mesh& mesh, int shift, CollapseSink& sink) {
 
 void takeCollapses(Recorder& recorder, const SimplifyOutput& simplified, Collapses& out) {
     out.largest_height = recorder.largestHeight();
-    out.dummies = recorder.dummies();
     out.refused = recorder.refused();
     std::vector<uint32_t> number(simplified.vertex_map.size());
     std::iota(number.begin(), number.end(), 0u);
     out.numbers = uint32_t(number.size());
     std::vector<uint8_t> gone(number.size(), 0);
-    for (const CollapseLink& link : recorder.links())
-        if (link.u != CollapseLink::kNone) gone[link.u] = 1;
+    for (const CollapseLink& link : recorder.links()) gone[link.u] = 1;
     out.store.append(recorder.links(), recorder.records(), number, recorder.words());
     out.base = simplified.mesh;
+    out.base_leaves.resize(out.base.triangleCount());
+    out.base_closed.assign(out.base.triangleCount(), 1);
+    for (uint32_t f = 0; f < simplified.triangle_map.size(); ++f)
+        if (const uint32_t t = simplified.triangle_map[f]; t != kNone)
+            out.base_leaves[t] = recorder.leavesOf(f);
     out.base_vertex.resize(out.base.vertexCount());
     for (uint32_t v = 0; v < number.size(); ++v)
         if (!gone[v] && simplified.vertex_map[v] != kNone)
@@ -70,7 +73,7 @@ void takeCollapses(Recorder& recorder, const SimplifyOutput& simplified, Collaps
 
 }  // namespace
 
-NodeForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget, BuildCounts* counts) {
+SplitForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget, BuildCounts* counts) {
     const Reservation memory =
         budget.reserve(kBuildBytes * mesh.triangleCount(), "a progressive mesh, built in memory,");
     BuildCounts unused;
@@ -82,16 +85,16 @@ NodeForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget, BuildC
     TempSpace space{"", &budget, 0};
     Collapses collapses(space);
     takeCollapses(recorder, base, collapses);
-    if (counts) counts->name_of.resize(mesh.vertexCount(), kNoVertex);
-    std::vector<OperationNode> nodes;
-    std::vector<NodeRow> rows;
-    NodeForest forest = encode(collapses, lattice, space, c,
-                               [&](NodeIndex n, const NodeRow& row, OperationNode& node) {
-                                   nodes.resize(std::max<size_t>(nodes.size(), n + 1));
-                                   rows.resize(nodes.size());
-                                   nodes[n] = std::move(node);
-                                   rows[n] = row;
-                               });
+    SplitForest forest;
+    std::vector<SplitNode> nodes;
+    std::vector<SplitRow> rows;
+    forest = encodeSplits(collapses, lattice, space, c,
+                          [&](NodeIndex n, const SplitRow& row, const SplitGrid&, SplitNode& node) {
+                              nodes.resize(std::max<size_t>(nodes.size(), n + 1));
+                              rows.resize(nodes.size());
+                              nodes[n] = std::move(node);
+                              rows[n] = row;
+                          });
     forest.node = std::move(nodes);
     forest.row = std::move(rows);
     return forest;

@@ -9,7 +9,7 @@
 #include <memory>
 
 #include "base/budget.h"
-#include "methods/pmesh/encoder.h"
+#include "methods/pmesh/split_encoder.h"
 #include "simplify/collapse_sink.h"
 
 namespace pietra::pmesh {
@@ -18,7 +18,7 @@ inline constexpr size_t kBuildBytes = 800;
 
 /// `mesh`: welded, without degenerate or doubled triangles, with normals, all positions multiples
 /// of 2^lattice.shift; its edge classes are set here.
-NodeForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
+SplitForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
                        BuildCounts* counts = nullptr);
 
 /// The simplification alone: `sink` makes who is told in the recorder's place, and tells it.

@@ -14,6 +14,7 @@ namespace {
 /// An operation with all that is below it.
 struct Subtree {
     uint32_t operation;
+    Leaf first;
     uint32_t count;
     Box3i box;
 };
@@ -21,11 +22,11 @@ struct Subtree {
 /// Levels of full nodes that so many operations fill.
 uint32_t levelsFor(uint64_t operations) {
     uint32_t levels = 0;
-    while (((uint64_t(1) << levels) - 1) * kNodeSlots < operations) ++levels;
+    while (((uint64_t(1) << levels) - 1) * kSplitSlots < operations) ++levels;
     return levels;
 }
 uint64_t nodesFor(uint64_t operations) {
-    return (operations + kNodeSlots - 1) / kNodeSlots;
+    return (operations + kSplitSlots - 1) / kSplitSlots;
 }
 
 double areaOf(const Box3i& box) {
@@ -56,8 +57,8 @@ class Cutter {
 public:
     const std::vector<uint8_t>& cut(std::span<const Subtree> trees) {
         CHECK_LE(size_t(2), trees.size());
-        CHECK_LE(trees.size(), size_t(2 * kNodeSlots));
-        return cutWithin(trees, trees.size() < kNodeSlots ? 1 : trees.size() - kNodeSlots);
+        CHECK_LE(trees.size(), size_t(2 * kSplitSlots));
+        return cutWithin(trees, trees.size() < kSplitSlots ? 1 : trees.size() - kSplitSlots);
     }
     /// Sides may have any number of subtrees, but none just a few: there are to be few roots.
     const std::vector<uint8_t>& cutFreely(std::span<const Subtree> trees) {
@@ -101,21 +102,31 @@ const std::vector<uint8_t>& Cutter::cutWithin(std::span<const Subtree> trees, si
 
 class Packer {
 public:
-    Packer(const Collapses& collapses, Packing& packing, const MakerSink& makes)
+    Packer(const Collapses& collapses, Packing& packing, const LeafSink& leaves)
         : collapses_(collapses),
           links_(collapses.store.links()),
           packing_(packing),
-          makes_(makes) {}
+          leaves_(leaves) {}
 
     void run() {
         std::vector<Subtree> all;
-        for (const uint32_t record : collapses_.base_last)
-            if (record != kNoOperation) all.push_back(subtree(record, link(record)));
-        addRoots(std::move(all));  // of an empty model one node, without operations
+        Leaf first = 0;
+        for (size_t v = 0; v < collapses_.base_last.size(); ++v) {
+            const uint32_t record = collapses_.base_last[v];
+            leaves_(collapses_.base_vertex[v], first);
+            uint32_t leaves = 1;
+            if (record != kNoSplit) {
+                all.push_back(subtree(record, first, link(record)));
+                leaves += all.back().count;
+            }
+            packing_.base_leaves.push_back(leaves);
+            first += leaves;
+        }
+        addRoots(std::move(all));  // of an empty model one node, without splits
         for (NodeIndex n = 0; n < packing_.size(); ++n) fill(n);
         for (const uint32_t record : collapses_.base_last) {
             const auto found = root_.find(record);
-            packing_.base_operation.push_back(found == root_.end() ? kNoOperation : found->second);
+            packing_.base_split.push_back(found == root_.end() ? kNoSplit : found->second);
         }
     }
 
@@ -127,8 +138,8 @@ private:
     };
 
     const CollapseLink& link(uint32_t record) { return links_[record]; }
-    static Subtree subtree(uint32_t record, const CollapseLink& link) {
-        return {record, link.operations, link.box};
+    static Subtree subtree(uint32_t record, Leaf first, const CollapseLink& link) {
+        return {record, first, link.operations, link.box};
     }
     void addRoots(std::vector<Subtree> trees);
     NodeIndex addNode(NodeIndex parent, uint32_t level, std::span<const Subtree> frontier);
@@ -138,7 +149,7 @@ private:
     std::vector<uint8_t> sidesOf() {
         uint64_t operations = 0;
         for (const Subtree& tree : reference_) operations += tree.count;
-        if (operations <= kNodeSlots || reference_.size() == 1)
+        if (operations <= kSplitSlots || reference_.size() == 1)
             return std::vector<uint8_t>(reference_.size(), 0);
         return cutter_.cut(reference_);
     }
@@ -146,8 +157,8 @@ private:
     const Collapses& collapses_;
     CachedRecords<CollapseLink> links_;
     Packing& packing_;
-    const MakerSink& makes_;
-    std::unordered_map<uint32_t, OperationId> root_;
+    const LeafSink& leaves_;
+    std::unordered_map<uint32_t, SplitId> root_;
     Cutter cutter_;
     // Of the node being filled:
     std::unordered_map<uint32_t, Known> known_;
@@ -155,10 +166,10 @@ private:
 };
 
 void Packer::addRoots(std::vector<Subtree> trees) {
-    if (trees.size() <= kNodeSlots) {
+    if (trees.size() <= kSplitSlots) {
         const NodeIndex node = addNode(kNoNode, 0, trees);
         for (uint32_t s = 0; s < trees.size(); ++s)
-            root_[trees[s].operation] = operationId(node, s);
+            root_[trees[s].operation] = splitId(node, s);
         return;
     }
     const std::vector<uint8_t> side = cutter_.cutFreely(trees);
@@ -176,7 +187,7 @@ NodeIndex Packer::addNode(NodeIndex parent, uint32_t level, std::span<const Subt
     node.row.parent = parent;
     node.row.level = uint16_t(level);
     node.frontier = uint32_t(frontier.size());
-    for (const Subtree& tree : frontier) node.slot.push_back({tree.operation, 0});
+    for (const Subtree& tree : frontier) node.slot.push_back({tree.operation, tree.first, 0});
     packing_.put(n, node);
     return n;
 }
@@ -190,16 +201,21 @@ void Packer::fill(NodeIndex n) {
     reference_.clear();
     for (uint32_t s = 0; s < slots.size(); ++s) {
         const CollapseLink& link = known_.at(slots[s].record).link;
-        if (link.u != CollapseLink::kNone) makes_(link.u, operationId(n, s));
+        const uint32_t below_v = link.child[0] == kNoSplit
+                                     ? 0
+                                     : known_.at(link.child[0]).link.operations;
+        const Leaf name = slots[s].first + below_v + 1;
+        leaves_(link.u, name);
         for (const uint32_t end : {0u, 1u}) {
             const uint32_t child = link.child[end];
-            if (child == kNoOperation) continue;
+            if (child == kNoSplit) continue;
             const Known& known = known_.at(child);
             if (known.is_taken) {
                 slots[s].kinds |= 1u << (2 * end);
-                slots.push_back({child, 0});
+                slots.push_back({child, end == 0 ? slots[s].first : name, 0});
             } else {
-                reference_.push_back(subtree(child, known.link));
+                reference_.push_back(
+                    subtree(child, end == 0 ? slots[s].first : name, known.link));
                 beyond.push_back({s, end});
             }
         }
@@ -207,7 +223,7 @@ void Packer::fill(NodeIndex n) {
     const std::vector<uint8_t> side = sidesOf();
     for (size_t i = 0; i < side.size(); ++i)
         slots[beyond[i][0]].kinds |= (2u + side[i]) << (2 * beyond[i][1]);
-    node.row.operations = uint32_t(slots.size());
+    node.row.splits = uint32_t(slots.size());
     for (const size_t which : {0u, 1u}) {
         std::vector<Subtree> part;
         for (size_t i = 0; i < side.size(); ++i)
@@ -225,19 +241,19 @@ void Packer::choose(std::span<const PackedSlot> frontier) {
         known.is_taken = true;
         const CollapseLink taken = known.link;  // known_ may move
         for (const uint32_t c : taken.child) {
-            if (c == kNoOperation) continue;
+            if (c == kNoSplit) continue;
             const CollapseLink child = link(c);
             known_[c] = {child, false};
             next.push({child.error, c});
         }
     };
-    CHECK_LE(frontier.size(), size_t(kNodeSlots));
+    CHECK_LE(frontier.size(), size_t(kSplitSlots));
     for (const PackedSlot& slot : frontier) {
         Known& known = known_[slot.record];
         known.link = link(slot.record);
         take(known);
     }
-    for (size_t room = kNodeSlots - frontier.size(); room > 0 && !next.empty(); --room) {
+    for (size_t room = kSplitSlots - frontier.size(); room > 0 && !next.empty(); --room) {
         const uint32_t record = next.top().second;
         next.pop();
         take(known_.at(record));
@@ -264,8 +280,8 @@ void Packing::put(NodeIndex n, const PackedNode& node) {
     size_ = std::max(size_, n + 1);
 }
 
-void packCollapses(const Collapses& collapses, Packing& packing, const MakerSink& makes) {
-    Packer(collapses, packing, makes).run();
+void packCollapses(const Collapses& collapses, Packing& packing, const LeafSink& leaves) {
+    Packer(collapses, packing, leaves).run();
 }
 
 }  // namespace pietra::pmesh

@@ -2,12 +2,15 @@
 // Writes down every collapse of the simplifier as the vertex split that undoes it, and forbids
 // those that no split could undo:
 //   - of irregular vertices (non-manifold edges, bow-ties): locked, they stay in the base mesh;
-//   - of stars with more neighbours than ranks can tell.
-// Where an edge is so long beside others around it that eight bits a coordinate would not do, its
-// ends are first moved by dummy operations.
+//   - of stars with more than kMaxNeighbours;
+//   - that would make chains of dependencies too long.
 //
-// Heights are levels counted from the fine side: one more than the largest height around. So they
-// are known while collapsing, whatever comes later and elsewhere.
+// A collapse depends on the last one of each vertex around: its criterion encloses theirs, and its
+// height, the length of the longest chain, is one more. So both are known while collapsing, whatever
+// comes later and elsewhere.
+//
+// Of each face it knows which leaves its corners were in the input, by their places among the
+// leaves below the vertices that they are now: of a merged vertex those of v come first.
 
 #include <array>
 #include <cstdint>
@@ -16,7 +19,7 @@
 
 #include "geometry/bounds.h"
 #include "methods/pmesh/normal_box.h"
-#include "methods/pmesh/operations.h"
+#include "methods/pmesh/split_node.h"
 #include "methods/pmesh/surface_map.h"
 #include "methods/pmesh/vertex_words.h"
 #include "simplify/collapse_sink.h"
@@ -24,55 +27,56 @@
 namespace pietra::pmesh {
 
 inline constexpr uint32_t kNoVertex = ~0u;
+inline constexpr uint32_t kMostHeight = 0xfffe;
+/// The least error that is stated, in steps.
+inline constexpr double kLeastError = 1.0 / 64;
 
 /// A collapse, as packing into nodes sees it.
 struct CollapseLink {
-    static constexpr uint64_t kNone = ~uint64_t(0);
-    uint64_t u = kNone;  ///< a vertex: by its place in the recorder's mesh; of a dummy none
-    std::array<uint32_t, 2> child;  ///< the records that v and u came from, or kNoOperation
+    uint64_t u = 0;                 ///< a vertex: by its place in the recorder's mesh
+    std::array<uint32_t, 2> child;  ///< the records that v and u came from, or kNoSplit
     uint32_t operations = 1;        ///< it and all below
-    /// Lattice units: the largest bound (surface_map.h) of the faces that this made; no less than
-    /// those below.
-    float error = 0;
-    Box3i box;  ///< of where it and all below bring vertices, in steps
+    float error = 0;                ///< lattice units; as in the shape
+    Box3i box;                      ///< likewise, in steps
 };
 
 /// The rest, as encoding sees it. Positions in steps, and as they were before the collapse.
 struct CollapseShape {
-    std::array<Vec3i, 2> position;            ///< of v and of u
-    std::array<uint16_t, 2> normal;           ///< the same
-    float error;                              ///< as in the link
-    uint32_t radius = 0;                      ///< from the merged vertex to the farthest touched
-    uint16_t height;                          ///< from 1
-    uint8_t left = kNoRank, right = kNoRank;  ///< of vl and vr, in the ring
-    uint8_t ring_size = 0;                    ///< 0: a dummy
-    bool closed = false;
-    /// Of the faces that it and all below found and made, if they are of a closed component.
+    std::array<Vec3i, 2> position;   ///< of v and of u
+    Vec3i merged;                    ///< of both after it
+    std::array<uint16_t, 2> normal;  ///< of v and of u
+    std::array<uint32_t, 2> leaves;  ///< the same
+    /// Lattice units: the largest bound (surface_map.h) of the faces that this made; no less than
+    /// that of those it depends on. They are in the box, too, and their normals in the box of these,
+    /// where they are of a closed component.
+    float error;
+    Box3i box;
     NormalBox normals;
+    bool closed = false;  ///< surely of a closed component
+    uint16_t height;      ///< from 1
+};
+/// A face that a collapse removes: its corners, as leaves counted from the first of v's, of u's and
+/// of the third vertex's.
+struct CollapseWing {
+    uint32_t vertex = kNoVertex;  ///< the third one; none: there is no such face
+    std::array<uint32_t, 3> offset{};
 };
 struct CollapseRecord : CollapseShape {
-    /// The neighbours of the merged vertex, counter-clockwise; where it is open, from the
-    /// beginning.
-    std::array<uint32_t, kMaxNeighbours> ring;
+    std::array<CollapseWing, 2> wing;  ///< of (v, u, third) and of (u, v, third)
 };
-
-/// How the offsets of one operation's ends are stored.
-struct QuantisedOffsets {
-    uint8_t shift = 0;
-    std::array<std::array<int8_t, 3>, 2> delta;
-};
-QuantisedOffsets quantiseOffsets(const std::array<Vec3i, 2>& offset);
 
 /// What a vertex has been through.
 struct VertexHistory {
-    uint32_t last = kNoOperation;           ///< the record of the last collapse into it
+    uint32_t last = kNoSplit;               ///< the record of the last collapse into it
     uint32_t height = 0;                    ///< of that
-    uint32_t operations = 0;                ///< of that and all below
+    uint32_t operations = 0;                ///< of that and all below: one less than leaves
     float error = 0;                        ///< of that
-    Box3i box;                              ///< of that and all below
-    NormalBox normals = NormalBox::none();  ///< likewise: CollapseShape::normals
+    Box3i box;                              ///< of that
+    NormalBox normals = NormalBox::none();  ///< of that
     uint8_t unused = 0;
 };
+
+using FaceLeaves = std::array<uint32_t, 3>;  ///< of each corner, counted as in CollapseWing
 
 class Recorder : public CollapseSink {
 public:
@@ -84,12 +88,12 @@ public:
     /// where such have the rank kRankFixed; both must outlive this. Positions are multiples of
     /// 2^shift. All is taken for closed.
     Recorder(const Mesh& mesh, std::span<const uint8_t> irregular, int shift);
-    /// Goes on where others ended: `history` is that of the vertices, one each, `bound` that of the
-    /// faces, `closed` whether these are surely of a closed component; records of this one are
-    /// counted from `first_record` on.
+    /// Goes on where others ended: `history` is that of the vertices, one each, `bound` and `leaves`
+    /// those of the faces, `closed` whether these are surely of a closed component; records of this
+    /// one are counted from `first_record` on.
     Recorder(const Mesh& mesh, std::vector<VertexHistory> history, const std::vector<float>& bound,
-             std::vector<uint8_t> closed, const SurfaceMap::Effort& effort, uint32_t first_record,
-             int shift);
+             std::vector<FaceLeaves> leaves, std::vector<uint8_t> closed,
+             const SurfaceMap::Effort& effort, uint32_t first_record, int shift);
 
     /// From now on, heights come to at most so many above the largest that there is.
     void limitHeights(uint32_t more);
@@ -103,28 +107,34 @@ public:
     std::vector<CollapseLink>& links() { return link_; }
     const std::vector<CollapseLink>& links() const { return link_; }
     std::vector<CollapseRecord>& records() { return record_; }
-    /// For each record the words of v and of u (of a dummy the same twice) before the collapse.
+    /// For each record the words of v and of u before the collapse.
     std::vector<uint32_t>& words() { return words_; }
     uint32_t largestHeight() const { return largest_; }
-    uint64_t dummies() const { return dummies_; }
     /// Attempts, not edges: an edge may be tried again.
     const Refused& refused() const { return refused_; }
     /// Of a face of the mesh that was not removed.
     float boundOf(uint32_t face) const { return map_.bound(face); }
     /// The same.
     bool isClosed(uint32_t face) const { return closed_[face]; }
+    const FaceLeaves& leavesOf(uint32_t face) const { return leaves_[face]; }
     /// Has all its triangles in this mesh. Known only once a collapse was offered; else false.
     bool isInside(uint32_t v) const { return !inside_.empty() && inside_[v]; }
     const VertexHistory& historyOf(uint32_t v) const { return history_[v]; }
     OctNormal normalOf(uint32_t v) const { return normal_[v]; }
 
 private:
-    float precisionAt(const CollapseStep& step, uint32_t end) const;
+    /// The neighbours of the merged vertex, counter-clockwise; where it is open, from the beginning.
+    struct OrderedRing {
+        std::array<uint32_t, kMaxNeighbours> vertex;
+        uint32_t size = 0;
+        bool closed = false;
+    };
+
+    static OrderedRing orderedRing(const Ring& ring);
     void addWords(const CollapseStep& step, uint32_t vertex);
-    void recordDummy(const CollapseStep& step, uint32_t end, const NormalBox& normals);
-    void push(uint32_t v, CollapseLink link, CollapseRecord record);
-    void gatherRing(const CollapseStep& step, CollapseRecord& record) const;
-    bool mapOn(const CollapseStep& step, CollapseRecord& record);
+    void enclose(const CollapseStep& step, const OrderedRing& ring, CollapseRecord& record) const;
+    bool mapOn(const CollapseStep& step, const OrderedRing& ring, CollapseRecord& record);
+    void removeFaces(const CollapseStep& step, CollapseRecord& record);
     bool spreadClosed(const CollapsingStar& star);
     uint32_t heightOf(uint32_t v) const { return history_[v].height; }
     Vec3i stepsOf(const WorkingMesh& mesh, const Vec3f& p) const;
@@ -133,6 +143,7 @@ private:
     int shift_;
     std::vector<OctNormal> normal_;
     std::vector<VertexHistory> history_;
+    std::vector<FaceLeaves> leaves_;
     std::vector<uint8_t> closed_, inside_;
     SurfaceMap map_;
     float largest_error_ = 0;  // of any face, ever
@@ -142,8 +153,7 @@ private:
     std::vector<uint32_t> words_;
     const WordLayout layout_;
     Mesh one_;  // of one vertex: room for its attributes
-    uint32_t largest_ = 0, most_height_ = kMaxLevel;
-    uint64_t dummies_ = 0;
+    uint32_t largest_ = 0, most_height_ = kMostHeight;
     Refused refused_;
 };
 

@@ -42,6 +42,7 @@ using Leaf = uint32_t;
 inline constexpr Leaf kNoLeaf = ~0u;
 using SplitId = uint32_t;
 inline constexpr SplitId kNoSplit = ~0u;
+inline constexpr uint32_t kMaxNeighbours = 15;  ///< of a vertex that splits
 
 /// An error, a box and a box of normals, rounded outwards; in the grid's units (SplitGrid).
 struct NestedCriterion {
@@ -59,6 +60,17 @@ struct NestedCriterion {
         for (size_t k = 0; k < 3; ++k)
             if (min[k] > other.min[k] || max[k] < other.max[k]) return false;
         return error >= other.error && normals.encloses(other.normals);
+    }
+    /// The least that encloses both.
+    NestedCriterion joined(const NestedCriterion& other) const {
+        NestedCriterion c = *this;
+        for (size_t k = 0; k < 3; ++k) {
+            c.min[k] = std::min(min[k], other.min[k]);
+            c.max[k] = std::max(max[k], other.max[k]);
+        }
+        c.error = std::max(error, other.error);
+        c.normals.add(other.normals);
+        return c;
     }
     /// The largest that both enclose; maybe one of nothing, which is good enough to be nested.
     NestedCriterion within(const NestedCriterion& other) const {
@@ -85,6 +97,18 @@ struct SplitGrid {
     }
     bool operator==(const SplitGrid&) const = default;
 };
+
+/// A normal in two bytes: the octahedron's coordinates to 7 bits and sign.
+constexpr uint16_t packNormal(OctNormal n) {
+    const auto narrow = [](int32_t x) {
+        return uint32_t((x * 254 + (x < 0 ? -32767 : 32767)) / 65534) & 0xff;
+    };
+    return uint16_t(narrow(n.x) | narrow(n.y) << 8);
+}
+constexpr OctNormal unpackNormal(uint32_t packed) {
+    const auto widen = [](uint32_t byte) { return int16_t(int32_t(int8_t(byte)) * 258); };
+    return {widen(packed & 0xff), widen(packed >> 8 & 0xff)};
+}
 
 /// A vertex as it is drawn: position in steps, and packNormal() of its normal.
 struct SplitVertex {

@@ -27,7 +27,7 @@
 #include <vector>
 
 #include "geometry/mesh.h"
-#include "methods/pmesh/operations.h"
+#include "methods/pmesh/split_node.h"
 #include "simplify/lanes4.h"
 
 namespace pietra::pmesh {

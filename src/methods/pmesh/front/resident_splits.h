@@ -26,7 +26,7 @@
 #include <span>
 #include <vector>
 
-#include "methods/pmesh/front/split_view.h"
+#include "methods/pmesh/split_view.h"
 
 namespace pietra::pmesh {
 

@@ -400,6 +400,26 @@ void SplitFront::openIfNeeded(Block& b, uint32_t slot, const SplitView& view) {
     b.queue.push_back(uint16_t(slot));
 }
 
+double SplitFront::largestError(const View& view) const {
+    const SplitForest& forest = nodes_.forest();
+    const SplitView one = splitView(view, forest.lattice, forest.grid, 1);
+    PerThread<double> largest(0.0);
+    parallelForSlices(block_.size(), kBatch, [&](size_t begin, size_t end) {
+        double& most = largest.local();
+        for (size_t b = begin; b < end; ++b)
+            for (uint32_t p = 0; p < block_[b].page.size(); ++p) {
+                const SplitPage& page = pageAt(block_[b], p * kPageVertices);
+                forBits(page.alive, [&](uint32_t i) {
+                    if (page.split[i] == kNoSplit) return;
+                    most = std::max(most, one.pixelsOf(page.next.get(i)));
+                });
+            }
+    });
+    double most = 0;
+    for (const double m : largest) most = std::max(most, m);
+    return most;
+}
+
 SplitCounts SplitFront::adapt(const SplitView& keep, const SplitLimits& limits) {
     SplitCounts counts;
     blocks_ = nodes_.anyBlocks();

@@ -56,6 +56,9 @@ public:
 
     size_t vertexCount() const { return vertices_; }
     size_t triangleCount() const { return triangles_; }
+    /// Of what could be refined, the largest error in pixels, at the near side of its box; infinite
+    /// where the eye is in that. What lies outside of the picture does not count.
+    double largestError(const View& view) const;
     /// What pages, blocks and the index of leaves take.
     size_t bytes() const;
     /// Pages that are not used go back to the system.
@@ -79,6 +82,7 @@ public:
     size_t blockCount() const { return block_.size(); }
     /// 0: there is no such block. Grows when anything in it has changed.
     uint64_t version(uint32_t block) const { return block_[block].version; }
+    uint64_t latestVersion() const { return version_; }
     /// 0: there is no such block.
     size_t countOf(uint32_t block) const { return block_[block].order.size(); }
     Slot slotAt(Place p) const {
@@ -87,6 +91,8 @@ public:
         return {pool_[page / kSlabPages][page % kSlabPages], slot % kPageVertices,
                 words_a_vertex_ ? wordsOf(b, slot) : nullptr};
     }
+    /// Another one for each vertex.
+    static uint32_t keyOf(Place p) { return p.block << kRankBits | p.rank; }
     Leaf firstLeaf(Place p) const { return block_[p.block].leaf[p.rank]; }
     /// The block that a leaf lies in; the vertex that it hangs below begins in that or before.
     uint32_t blockOf(Leaf leaf) const { return index_[leaf / 64] >> kRankBits; }

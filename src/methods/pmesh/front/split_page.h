@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "methods/pmesh/front/split_view.h"
+#include "methods/pmesh/split_view.h"
 
 namespace pietra::pmesh {
 

@@ -1,0 +1,41 @@
+#include "methods/pmesh/split_view.h"
+
+namespace pietra::pmesh {
+
+SplitView splitView(const View& view, const Lattice& lattice, const SplitGrid& grid,
+                    double pixels) {
+    const double unit = grid.unit(lattice);
+    const Vec3d eye = view.eye() / unit - Vec3d(grid.origin) / double(uint64_t(1) << grid.shift);
+    const double tan_x = view.size().width / (2 * view.focal_px());
+    const double tan_y = view.size().height / (2 * view.focal_px());
+    const Vec3d forward = -view.back();
+    const std::array<Vec3d, 4> side{view.right() + tan_x * forward, -view.right() + tan_x * forward,
+                                    view.up() + tan_y * forward, -view.up() + tan_y * forward};
+    SplitView out;
+    for (int k = 0; k < 3; ++k) out.eye[size_t(k)] = float(eye[k]);
+    for (size_t i = 0; i < side.size(); ++i) {
+        const Vec3d n = glm::normalize(side[i]);
+        for (int k = 0; k < 3; ++k) out.side[i][size_t(k)] = float(n[k]);
+        out.at_eye[i] = float(glm::dot(n, eye));
+    }
+    out.reach = float(view.focal_px() * (1 + tan_x * tan_x + tan_y * tan_y) / pixels);
+    return out;
+}
+
+SplitView splitView(const View& view, const Lattice& lattice, const SplitGrid& grid, double pixels,
+                    const Box3i& bounds) {
+    SplitView out = splitView(view, lattice, grid, pixels);
+    const Vec3d eye = view.eye();
+    out.hides_backs = glm::any(glm::lessThan(eye, Vec3d(bounds.min))) ||
+                      glm::any(glm::greaterThan(eye, Vec3d(bounds.max)));
+    return out;
+}
+
+SplitView wholeSplitView(bool all) {
+    SplitView view;
+    view.eye.fill(-1);  // not within a box
+    view.reach = all ? 1e18f : 1e-18f;
+    return view;
+}
+
+}  // namespace pietra::pmesh
