@@ -23,19 +23,22 @@ SplitGrid gridOf(const Box3i& box) {
 
 class Encoder {
 public:
-    Encoder(const Collapses& collapses, TempSpace& space, const SplitSink& sink,
-            SplitForest& forest)
+    Encoder(const Collapses& collapses, TempSpace& space, BuildCounts& counts,
+            const SplitSink& sink, SplitForest& forest)
         : collapses_(collapses),
           packing_(space),
           shapes_(collapses.store.shapes()),
           wings_(collapses.store.wings()),
           wing_leaves_(collapses, space),
+          counts_(counts),
           sink_(sink),
           forest_(forest) {}
 
     void run() {
-        packCollapses(collapses_, packing_,
-                      [&](VertexId v, Leaf first) { wing_leaves_.add(v, first); });
+        packCollapses(collapses_, packing_, [&](VertexId v, Leaf first) {
+            wing_leaves_.add(v, first);
+            if (!counts_.leaf_of.empty()) counts_.leaf_of[v] = first;
+        });
         wing_leaves_.find();
         makeBase();
         std::vector<NestedCriterion> row(packing_.size());
@@ -53,6 +56,7 @@ private:
     CachedRecords<CollapseShape> shapes_;
     CachedRecords<Wings> wings_;
     WingLeaves wing_leaves_;
+    BuildCounts& counts_;
     const SplitSink& sink_;
     SplitForest& forest_;
 };
@@ -154,7 +158,7 @@ SplitForest encodeSplits(const Collapses& collapses, const Lattice& lattice, Tem
     counts.operations = collapses.store.size();
     SplitForest forest;
     forest.lattice = lattice;
-    Encoder(collapses, space, sink, forest).run();
+    Encoder(collapses, space, counts, sink, forest).run();
     return forest;
 }
 

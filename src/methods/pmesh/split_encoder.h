@@ -18,6 +18,9 @@ struct BuildCounts {
     Recorder::Refused refused;
     uint32_t levels = 0;  ///< the longest chain of dependencies
     uint64_t operations = 0;
+    /// The first one of each vertex; set where it had this size, for tests, whose vertices are told
+    /// by places.
+    std::vector<Leaf> leaf_of;
 };
 
 /// Told of each node once, after its children. One thread.

@@ -300,16 +300,16 @@ SplitView SplitFront::withinLimits(const SplitView& view, const SplitLimits& lim
         v.reach = float(double(view.reach) * std::exp2(-octaves));
         return v;
     };
-    double fine = 0, coarse = 128;  // fine is too much
+    // In octaves, coarse ones first: those of a view that fits are found in some ten steps.
+    double fine = 0, coarse = 128;
     size_t at_coarse = 0;
-    while (coarse - fine > 0.05) {
-        const double middle = fine > 0 ? (fine + coarse) / 2 : coarse > 0.1 ? coarse / 2 : 0.05;
+    while (coarse - fine > (at_coarse > 0 ? 0.05 : 1e-4)) {
+        const double middle = (fine + coarse) / 2;
         const size_t count = countSplits(coarser(middle), most);
         if (count <= most)
             coarse = middle, at_coarse = count;
         else
             fine = middle;
-        if (fine == 0 && coarse <= 0.1) break;
     }
     // Some is always done, if memory allows.
     if (at_coarse == 0 && countSplits(coarser(fine), room) <= room) return coarser(fine);
