@@ -1,11 +1,11 @@
 #pragma once
-// The cameras of the benchmarks of progressive meshes, as criteria for 1920x1080.
+// The cameras of the benchmarks of progressive meshes, at 1920x1080.
 
 #include <cmath>
 #include <cstdlib>
 
 #include "geometry/bounds.h"
-#include "methods/pmesh/criterion.h"
+#include "multires/view.h"
 
 namespace pietra::pmesh {
 
@@ -18,19 +18,10 @@ inline View cameraFrom(const Box3d& box, const Lattice& lattice, double turn, do
     return View(camera, {1920, 1080}, lattice);
 }
 
-inline Criterion viewFrom(const Box3d& box, const Lattice& lattice, double turn, double distance,
-                          double pixels) {
-    return criterionOf(cameraFrom(box, lattice, turn, distance), lattice, pixels);
-}
-
 /// To and fro while it circles, eight frames a round.
 inline View stormCamera(const Box3d& box, const Lattice& lattice, int frame) {
     const double t = std::abs(frame % 8 - 4) / 4.0;
     return cameraFrom(box, lattice, 0.05 * frame, 0.4 + 1.6 * t);
-}
-
-inline Criterion stormView(const Box3d& box, const Lattice& lattice, int frame, double pixels) {
-    return criterionOf(stormCamera(box, lattice, frame), lattice, pixels);
 }
 
 }  // namespace pietra::pmesh

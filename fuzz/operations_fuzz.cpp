@@ -1,4 +1,4 @@
-// Fuzzes the pages of operations (methods/pmesh/node_codec.h). The first byte picks a node's or a
+// Fuzzes the pages of splits (methods/pmesh/split_codec.h). The first byte picks a node's or a
 // base mesh's; the next ones the row that the file's table would give.
 // FUZZ_SEEDS=DIR writes valid pages to DIR and stops: start from those.
 
@@ -7,7 +7,7 @@
 
 #include "base/check.h"
 #include "methods/pmesh/in_core_builder.h"
-#include "methods/pmesh/node_codec.h"
+#include "methods/pmesh/split_codec.h"
 #include "simplify/test_meshes.h"
 
 namespace pietra::pmesh {
@@ -15,41 +15,42 @@ namespace {
 
 constexpr size_t kHead = 6;
 
-/// Children 1 and 2, or only the first; a parent or none.
-NodeRow rowFrom(const uint8_t* head) {
-    NodeRow row;
+/// Children 1 and 2, or only the first; a parent or none. Its criterion encloses all.
+SplitRow rowFrom(const uint8_t* head) {
+    SplitRow row;
     if (head[1] & 1) row.child[0] = 1;
     if (head[1] & 2) row.child[1] = 2;
     if (head[1] & 4) row.parent = 0;
-    row.operations = uint32_t(head[2] | head[3] << 8);
-    row.error = head[4];
+    row.splits = uint32_t(head[2] | head[3] << 8);
+    row.criterion.max.fill(0xffff);
+    row.criterion.error = NestedCriterion::kEver - 1;
     return row;
 }
 
 void fuzzNode(const uint8_t* head, std::span<const std::byte> bytes) {
-    OperationNode node;
+    SplitNode node;
     std::string fault;
-    const NodeIndex index = head[1] & 4 ? 3 : 0;
-    if (!decodeNode(bytes, index, rowFrom(head), {}, node, fault)) {
+    if (!decodeSplitNode(bytes, rowFrom(head), {}, node, fault)) {
         CHECK(!fault.empty());
         return;
     }
     // What was accepted survives.
-    OperationNode again;
-    CHECK(decodeNode(encodeNode(node), index, rowFrom(head), {}, again, fault));
+    SplitNode again;
+    CHECK(decodeSplitNode(encodeSplitNode(node), rowFrom(head), {}, again, fault));
     CHECK(again == node);
 }
 
 void fuzzBase(std::span<const std::byte> bytes) {
-    NodeForest forest;
+    SplitForest forest;
     forest.row.resize(3);
+    forest.row[0].splits = 600;
     std::string fault;
-    if (!decodeBase(bytes, kMethodFormat, forest, fault)) CHECK(!fault.empty());
+    if (!decodeSplitBase(bytes, forest, fault)) CHECK(!fault.empty());
 }
 
 void writeSeeds(const std::string& directory) {
     Budget budget(size_t(1) << 30);
-    const NodeForest forest = buildInCore(test::toLattice(test::sphereShape(20), 900), {}, budget);
+    const SplitForest forest = buildInCore(test::toLattice(test::sphereShape(20), 900), {}, budget);
     const auto save = [&](const std::string& name, std::vector<char> head,
                           const std::vector<std::byte>& bytes) {
         std::ofstream out(directory + "/" + name, std::ios::binary);
@@ -57,15 +58,14 @@ void writeSeeds(const std::string& directory) {
         out.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
     };
     for (NodeIndex n = 0; n < forest.node.size(); ++n) {
-        const NodeRow& row = forest.row[n];
+        const SplitRow& row = forest.row[n];
         const int links = int(row.child[0] != kNoNode) + 2 * int(row.child[1] != kNoNode) +
                           4 * int(row.parent != kNoNode);
         save("node-" + std::to_string(n),
-             {0, char(links), char(row.operations & 255), char(row.operations >> 8),
-              char(row.error), 0},
-             encodeNode(forest.node[n]));
+             {0, char(links), char(row.splits & 255), char(row.splits >> 8), 0, 0},
+             encodeSplitNode(forest.node[n]));
     }
-    save("base", {1, 0, 0, 0, 0, 0}, encodeBase(forest));
+    save("base", {1, 0, 0, 0, 0, 0}, encodeSplitBase(forest));
 }
 
 }  // namespace
