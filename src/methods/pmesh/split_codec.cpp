@@ -320,19 +320,25 @@ Columns& threadColumns(size_t count) {
     return columns;
 }
 
-void writeCriterion(ByteWriter& writer, const NestedCriterion& c) {
-    for (size_t k = 0; k < 3; ++k) writer.fixed(c.min[k]), writer.fixed(c.max[k]);
-    writer.fixed(c.error);
-    writer.fixed(c.normals.bits());
+void writeParts(ByteWriter& writer, std::span<const NestedCriterion> parts) {
+    writer.varint(parts.size());
+    for (const NestedCriterion& c : parts) {
+        for (size_t k = 0; k < 3; ++k) writer.fixed(c.min[k]), writer.fixed(c.max[k]);
+        writer.fixed(c.error);
+        for (size_t k = 0; k < 3; ++k) writer.fixed(uint8_t(c.normals.bits() >> (8 * k)));
+    }
 }
 
-NestedCriterion readCriterion(ByteReader& reader) {
-    NestedCriterion c;
-    for (size_t k = 0; k < 3; ++k)
-        c.min[k] = reader.fixed<uint16_t>(), c.max[k] = reader.fixed<uint16_t>();
-    c.error = reader.fixed<uint16_t>();
-    c.normals = NormalBox::ofBits(reader.fixed<uint32_t>());
-    return c;
+void readParts(ByteReader& reader, std::vector<NestedCriterion>& parts) {
+    parts.resize(reader.varintUpTo(kMostParts));
+    for (NestedCriterion& c : parts) {
+        for (size_t k = 0; k < 3; ++k)
+            c.min[k] = reader.fixed<uint16_t>(), c.max[k] = reader.fixed<uint16_t>();
+        c.error = reader.fixed<uint16_t>();
+        uint32_t bits = 0;
+        for (size_t k = 0; k < 3; ++k) bits |= uint32_t(reader.fixed<uint8_t>()) << (8 * k);
+        c.normals = NormalBox::ofBits(bits);
+    }
 }
 
 /// Columns of a base: of roots, then of triangles, then of roots again.
@@ -359,7 +365,7 @@ std::vector<std::byte> encodeSplitNode(const SplitNode& node) {
     writer.fixed(kSplitsCodec);
     writer.varint(node.split.size());
     writer.varint(node.frontier);
-    for (const NestedCriterion& c : node.child_criterion) writeCriterion(writer, c);
+    for (const auto& parts : node.child_parts) writeParts(writer, parts);
     columns.write(writer);
     return bytes;
 }
@@ -371,7 +377,7 @@ bool decodeSplitNode(std::span<const std::byte> bytes, const SplitRow& row, Word
         return fault = "its codec is unknown", false;
     node.split.assign(reader.varintUpTo(kSplitSlots), {});
     node.frontier = reader.varintUpTo(uint32_t(node.split.size()));
-    for (NestedCriterion& c : node.child_criterion) c = readCriterion(reader);
+    for (auto& parts : node.child_parts) readParts(reader, parts);
     node.layout = layout;
     node.word.assign(2 * layout.words() * node.split.size(), 0);
     Columns& columns = threadColumns(columnCount(layout));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "base/check.h"
 #include "methods/pmesh/node_packer.h"
@@ -21,6 +22,53 @@ SplitGrid gridOf(const Box3i& box) {
     return grid;
 }
 
+/// What a frontier states: large errors, which are few, apart from small ones, and these by place.
+std::vector<NestedCriterion> partsOf(std::span<const VertexSplit> frontier) {
+    constexpr std::array<uint32_t, 4> kShare{16, 4, 2, 1};  // of errors: this part, beyond the last
+    constexpr size_t kWhole = 24;                           // splits that are not parted
+    std::vector<NestedCriterion> parts;
+    std::vector<uint32_t> order(frontier.size());
+    std::iota(order.begin(), order.end(), 0u);
+    const auto criterion = [&](uint32_t i) -> const NestedCriterion& {
+        return frontier[i].criterion;
+    };
+    const auto join = [&](std::span<uint32_t> some) {
+        NestedCriterion c = criterion(some[0]);
+        for (const uint32_t i : some) c = c.joined(criterion(i));
+        return c;
+    };
+    const auto halve = [&](std::span<uint32_t> some) {
+        const NestedCriterion all = join(some);
+        size_t axis = 0;
+        for (size_t k = 1; k < 3; ++k)
+            if (all.max[k] - all.min[k] > all.max[axis] - all.min[axis]) axis = k;
+        const auto key = [&](uint32_t i) {
+            return std::pair(uint32_t(criterion(i).min[axis]) + criterion(i).max[axis], i);
+        };
+        std::nth_element(some.begin(), some.begin() + ptrdiff_t(some.size() / 2), some.end(),
+                         [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
+        return std::array{some.first(some.size() / 2), some.subspan(some.size() / 2)};
+    };
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+        return std::pair(criterion(b).error, a) < std::pair(criterion(a).error, b);
+    });
+    size_t begin = 0;
+    for (const uint32_t share : kShare) {
+        const size_t end = frontier.size() / share;
+        const auto some = std::span(order).subspan(begin, end - begin);
+        if (share > 1 && some.size() < kWhole) continue;
+        begin = end;
+        if (some.empty()) continue;
+        if (some.size() < kWhole) {
+            parts.push_back(join(some));
+            continue;
+        }
+        for (const auto& half : halve(some))
+            for (const auto& quarter : halve(half)) parts.push_back(join(quarter));
+    }
+    return parts;
+}
+
 class Encoder {
 public:
     Encoder(const Collapses& collapses, TempSpace& space, BuildCounts& counts,
@@ -30,6 +78,7 @@ public:
           shapes_(collapses.store.shapes()),
           wings_(collapses.store.wings()),
           wing_leaves_(collapses, space),
+          parts_(space),
           counts_(counts),
           sink_(sink),
           forest_(forest) {}
@@ -41,13 +90,12 @@ public:
         });
         wing_leaves_.find();
         makeBase();
-        std::vector<NestedCriterion> row(packing_.size());
-        for (NodeIndex n = packing_.size(); n-- > 0;) encodeNode(n, row);
+        for (NodeIndex n = packing_.size(); n-- > 0;) encodeNode(n);
     }
 
 private:
     void makeBase();
-    void encodeNode(NodeIndex n, std::vector<NestedCriterion>& rows);
+    void encodeNode(NodeIndex n);
     VertexSplit encodeSplit(const PackedSlot& slot, const CollapseShape& r);
     NestedCriterion criterionOf(const CollapseShape& r) const;
 
@@ -56,6 +104,7 @@ private:
     CachedRecords<CollapseShape> shapes_;
     CachedRecords<Wings> wings_;
     WingLeaves wing_leaves_;
+    Spill parts_;  ///< of each node, as its parent will have them
     BuildCounts& counts_;
     const SplitSink& sink_;
     SplitForest& forest_;
@@ -122,7 +171,7 @@ VertexSplit Encoder::encodeSplit(const PackedSlot& slot, const CollapseShape& r)
     return split;
 }
 
-void Encoder::encodeNode(NodeIndex n, std::vector<NestedCriterion>& rows) {
+void Encoder::encodeNode(NodeIndex n) {
     PackedNode packed = packing_.node(n);
     SplitNode node;
     node.frontier = packed.frontier;
@@ -139,13 +188,21 @@ void Encoder::encodeNode(NodeIndex n, std::vector<NestedCriterion>& rows) {
         if (forest_.layout.words() > 0)
             collapses_.store.readWords(slot.record, forest_.layout, node.word);
     }
-    NestedCriterion& row = rows[n];
-    for (uint32_t s = 0; s < node.frontier; ++s)
-        row = s == 0 ? node.split[s].criterion : row.joined(node.split[s].criterion);
-    packed.row.criterion = row;
-    for (const size_t side : {0u, 1u})
-        if (const NodeIndex child = packed.row.child[side]; child != kNoNode)
-            node.child_criterion[side] = rows[child];
+    struct Parts {
+        uint32_t count = 0;
+        std::array<NestedCriterion, kMostParts> part;
+    } parts;
+    for (const NestedCriterion& part : partsOf(std::span(node.split).first(node.frontier))) {
+        packed.row.criterion = parts.count == 0 ? part : packed.row.criterion.joined(part);
+        parts.part[parts.count++] = part;
+    }
+    parts_.write(n * sizeof parts, std::as_bytes(std::span(&parts, 1)));
+    for (const size_t side : {0u, 1u}) {
+        const NodeIndex child = packed.row.child[side];
+        if (child == kNoNode) continue;
+        parts_.read(child * sizeof parts, std::as_writable_bytes(std::span(&parts, 1)));
+        node.child_parts[side].assign(parts.part.begin(), parts.part.begin() + parts.count);
+    }
     sink_(n, packed.row, forest_.grid, node);
 }
 

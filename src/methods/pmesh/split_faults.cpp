@@ -27,8 +27,12 @@ public:
         for (const size_t side : {0u, 1u}) {
             if ((next_[1 + side] == 0) != (row_.child[side] == kNoNode))
                 return fmt::format("it refers to {} splits of child {}", next_[1 + side], side);
-            if (row_.child[side] != kNoNode && !row_.criterion.encloses(node_.child_criterion[side]))
-                return fmt::format("child {}'s criterion exceeds its own", side);
+            if ((row_.child[side] == kNoNode) != node_.child_parts[side].empty() ||
+                node_.child_parts[side].size() > kMostParts)
+                return fmt::format("child {} has {} parts", side, node_.child_parts[side].size());
+            for (const NestedCriterion& part : node_.child_parts[side])
+                if (!row_.criterion.encloses(part))
+                    return fmt::format("child {}'s criterion exceeds its own", side);
         }
         return "";
     }
@@ -98,7 +102,10 @@ std::string faultBetween(const SplitRow& parent_row, const SplitNode& parent, No
                 return fmt::format("split {}: its leaves are not what its parent knows", slot);
             if (!split.criterion.encloses(below.criterion))
                 return fmt::format("split {}: its criterion exceeds its parent's", slot);
-            if (!parent.child_criterion[side].encloses(below.criterion))
+            const auto& parts = parent.child_parts[side];
+            if (std::none_of(parts.begin(), parts.end(), [&](const NestedCriterion& part) {
+                    return part.encloses(below.criterion);
+                }))
                 return fmt::format("split {}: its criterion exceeds what its node's parent states",
                                    slot);
         }

@@ -17,8 +17,9 @@
 // A node says all relative to where its frontier is, so that it can be decoded by itself.
 //
 // Criteria are nested along dependencies: a split needs the star that its collapse made, and what
-// it needs states no less. A split's criterion encloses those of its children, too, and a row's
-// those of all splits in its node and below.
+// it needs states no less. A split's criterion encloses those of its children, too; so what a
+// frontier states encloses all that is in its node and below. The parent node tells that, in some
+// parts, as one box would be large where one error is.
 //
 // Plain data.
 
@@ -143,6 +144,7 @@ struct VertexSplit {
 /// The splits of one node: 3 * 682 codes and one that means none fit 11 bits.
 inline constexpr uint32_t kSplitSlots = 682;
 inline constexpr uint16_t kNoChildSplit = 2047;
+inline constexpr uint32_t kMostParts = 16;  ///< of a frontier
 constexpr SplitId splitId(NodeIndex node, uint32_t slot) {
     return node * kSplitSlots + slot;
 }
@@ -157,8 +159,9 @@ constexpr uint32_t slotOfSplit(SplitId id) {
 struct SplitNode {
     std::vector<VertexSplit> split;  ///< at most kSplitSlots
     uint32_t frontier = 0;           ///< how many, the first ones, are referred to from above
-    /// Exactly those of the children's rows.
-    std::array<NestedCriterion, 2> child_criterion;
+    /// Of each child node: what the splits of its frontier state, in parts of them; each is enclosed
+    /// by one.
+    std::array<std::vector<NestedCriterion>, 2> child_parts;
     WordLayout layout;
     std::vector<uint32_t> word;  ///< for each split those of v, then of u, after it
     bool operator==(const SplitNode&) const = default;
@@ -170,8 +173,7 @@ struct SplitRow {
     std::array<NodeIndex, 2> child{kNoNode, kNoNode};
     uint32_t splits = 0;
     uint16_t level = 0;  ///< in the tree of nodes: 0 for roots
-    /// As SplitNode::child_criterion has it, or, from a file's table, one that encloses that.
-    NestedCriterion criterion;
+    NestedCriterion criterion;  ///< encloses those of all splits in it and below
     bool operator==(const SplitRow&) const = default;
 };
 

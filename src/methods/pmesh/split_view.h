@@ -2,7 +2,8 @@
 // Which splits a view needs: those whose error, at the point of their box nearest to the eye,
 // shows. Outside the picture the tolerance grows with the distance from its pyramid: a sharp cut
 // there would force long chains of splits for nothing but order. What faces away, where backs are
-// not seen, may be as coarse as if it were kHidden times farther away.
+// not seen, may be as coarse as if it were kHidden times farther away; so may what the last picture
+// hid. It is drawn all the same, and refined as soon as it comes to light.
 //
 // Floats as they round, no multiply-add: the same on every machine. Monotone in error, box and box
 // of normals, as each step is: what encloses a needed criterion is needed.
@@ -10,8 +11,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 
 #include "geometry/bounds.h"
+#include "methods/pmesh/occlusion.h"
 #include "methods/pmesh/split_node.h"
 #include "multires/view.h"
 
@@ -24,6 +27,8 @@ struct SplitView {
     float reach = 0;                             ///< distance from which an error of 1 shows
     /// The eye is outside of all closed parts, which are drawn one-sided: their backs are not seen.
     bool hides_backs = false;
+    /// Null: nothing is hidden.
+    std::shared_ptr<const Occlusion> occlusion;
     static constexpr float kOutside = 8, kHidden = 8;
 
     bool shows(const NestedCriterion& c, float from) const {
@@ -71,7 +76,11 @@ struct SplitView {
     }
     bool needs(const NestedCriterion& c) const {
         if (!shows(c, reach)) return false;
-        return !hides_backs || shows(c, reach * (1 / kHidden)) || !facesAway(c);
+        return !hidesAny() || shows(c, reach * (1 / kHidden)) || !hides(c);
+    }
+    bool hidesAny() const { return hides_backs || occlusion; }
+    bool hides(const NestedCriterion& c) const {
+        return (hides_backs && facesAway(c)) || (occlusion && occlusion->hides(c));
     }
 };
 

@@ -45,9 +45,6 @@ ResidentSplits::ResidentSplits(SplitForest forest, uint32_t most)
         root_criterion_.resize(splitId(n + 1, 0));
         for (uint32_t s = 0; s < forest_.node[n].frontier; ++s)
             root_criterion_[splitId(n, s)] = forest_.node[n].split[s].criterion;
-        for (const size_t which : {0u, 1u})
-            if (const NodeIndex c = forest_.row[n].child[which]; c != kNoNode)
-                forest_.row[c].criterion = forest_.node[n].child_criterion[which];
     }
     forest_.node = {};
 }
@@ -61,6 +58,8 @@ std::unique_ptr<ResidentSplits::Loaded> ResidentSplits::placed(
     const size_t count = node.split.size();
     loaded->split.resize(count);
     loaded->word = node.word;
+    loaded->child_parts = node.child_parts;
+    const NestedCriterion row = forest_.row[index].criterion;
     std::vector<Leaf> first(count);
     std::vector<SplitVertex> from(count);
     for (uint32_t s = 0; s < node.frontier; ++s) {
@@ -102,7 +101,7 @@ std::unique_ptr<ResidentSplits::Loaded> ResidentSplits::placed(
                 from[slot] = to.vertex[end];
             } else {
                 to.child[end] = splitId(forest_.row[index].child[where - 1], slot);
-                to.criterion[end] = node.child_criterion[where - 1];
+                to.criterion[end] = row;
                 loaded->reference[where - 1].push_back(
                     {end == 0 ? first[s] : to.name, split.leaves[end], uint16_t(s), end});
             }
@@ -111,24 +110,34 @@ std::unique_ptr<ResidentSplits::Loaded> ResidentSplits::placed(
     return loaded;
 }
 
-/// A row encloses those of its children, so only below what is wanted is anything wanted.
 void ResidentSplits::look(const SplitView& view) {
     ++frame_;
     victims_.reset();
     blocking_.clear();
-    wanted_ = 0;
     std::vector<NodeIndex> asked;
-    for (const NodeIndex n : loaded_) {
-        const SplitRow& row = forest_.row[n];
-        if (row.parent != kNoNode && !view.needs(row.criterion)) continue;
+    // Down from the roots: only below what is wanted is anything wanted.
+    std::vector<NodeIndex> wanted;
+    for (NodeIndex n = 0; n < forest_.row.size() && forest_.row[n].parent == kNoNode; ++n)
+        wanted.push_back(n);
+    for (size_t i = 0; i < wanted.size(); ++i) {
+        const NodeIndex n = wanted[i];
         state_[n].last_used = frame_;
-        ++wanted_;
-        for (const NodeIndex c : row.child) {
-            if (c == kNoNode || isLoaded(c) || !view.needs(forest_.row[c].criterion)) continue;
-            blocking_.add(forest_.row[c].criterion);
-            if (!state_[c].is_bad) asked.push_back(c);
+        for (const size_t side : {0u, 1u}) {
+            const NodeIndex c = forest_.row[n].child[side];
+            if (c == kNoNode) continue;
+            const auto& parts = node_[n]->child_parts[side];
+            const auto needed = [&](const NestedCriterion& part) { return view.needs(part); };
+            if (isLoaded(c)) {
+                if (std::any_of(parts.begin(), parts.end(), needed)) wanted.push_back(c);
+                continue;
+            }
+            const size_t before = blocking_.error.size();
+            for (const NestedCriterion& part : parts)
+                if (needed(part)) blocking_.add(part);
+            if (blocking_.error.size() > before && !state_[c].is_bad) asked.push_back(c);
         }
     }
+    wanted_ = wanted.size();
     std::sort(asked.begin(), asked.end());
     for (const NodeIndex n : asked_)
         if (!std::binary_search(asked.begin(), asked.end(), n)) state_[n].asked = 0;
@@ -201,9 +210,6 @@ std::optional<std::vector<ResidentSplits::Arrived>> ResidentSplits::arrive(NodeI
         above.split[r.slot].criterion[r.end] = node.split[s].criterion;
         arrived.push_back({r.first, splitId(index, s), node.split[s].criterion});
     }
-    for (const size_t which : {0u, 1u})
-        if (const NodeIndex c = forest_.row[index].child[which]; c != kNoNode)
-            forest_.row[c].criterion = node.child_criterion[which];
     loaded->position = uint32_t(loaded_.size());
     loaded_.push_back(index);
     node_[index] = std::move(loaded);

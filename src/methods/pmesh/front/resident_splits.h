@@ -6,10 +6,11 @@
 // others have read, in the order of requests(). Never waits for anything.
 //
 //   - Roots are there from the beginning and stay.
-//   - Wanted is a node whose row the view needs; it encloses all that is in it and below. Asked for
-//     is what is wanted and not there, while its parent is. Longest asked for comes first.
+//   - Wanted is a node of which the view needs a part of what its parent says that its frontier
+//     states, which encloses all that is in it and below. Asked for is what is wanted and not
+//     there, while its parent is. Longest asked for comes first.
 //   - While some are missing, a split may depend on what nobody can know: it is blocked if its
-//     criterion lies within that of a missing node. What is not blocked depends on nothing that is
+//     criterion lies within such a part of a missing node. What is not blocked depends on nothing that is
 //     missing or blocked, as criteria nest along dependencies. What was applied before may stay.
 //   - What is wanted is in use and stays; undoing a split needs no node.
 //   - No node arrives beyond `most`. Where more are required(), in use or asked for, than that,
@@ -124,6 +125,7 @@ private:
         std::vector<ResidentSplit> split;
         std::vector<uint32_t> word;
         std::array<std::vector<Reference>, 2> reference;
+        std::array<std::vector<NestedCriterion>, 2> child_parts;
         uint32_t position;  ///< in loaded_
     };
     static constexpr uint32_t kFramesKept = 60;  ///< for what is only prefetched

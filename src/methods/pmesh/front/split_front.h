@@ -64,7 +64,7 @@ public:
     /// Pages that are not used go back to the system.
     void giveBack();
     /// So much a vertex more takes, at most, but for a few KiB.
-    static constexpr size_t kVertexBytes = sizeof(SplitPage) / kPageVertices * 5 / 4 + 6;
+    static constexpr size_t kVertexBytes = sizeof(SplitPage) / kPageVertices * 3 / 2 + 16;
 
     // ---- what is drawn
 
@@ -109,7 +109,7 @@ public:
 
 private:
     static constexpr uint32_t kRankBits = 12, kRankMask = (1u << kRankBits) - 1;
-    static constexpr uint32_t kMostInBlock = 2048, kFewInBlock = 640, kMostInRound = 16384;
+    static constexpr uint32_t kMostInBlock = 960, kFewInBlock = 320, kMostInRound = 16384;
     static_assert(kMostInBlock < kRankMask);
     static constexpr uint32_t kNone = ~0u;
     static constexpr uint32_t kSlabPages = 256;

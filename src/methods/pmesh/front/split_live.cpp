@@ -15,7 +15,7 @@ namespace pietra::pmesh {
 namespace {
 
 /// Of a vertex: its part of chunks, about.
-constexpr size_t kChunkBytes = 64;
+constexpr size_t kChunkBytes = 72;
 /// Of a frame that has little time.
 constexpr size_t kFewSplits = 2048;
 
@@ -116,7 +116,10 @@ size_t LiveSplits::drawable(uint64_t triangles) const {
 }
 
 const LiveFrame& LiveSplits::adapt(const LiveTask& task) {
-    const SplitView view = viewOf(*task.view, task.pixels);
+    SplitView view = viewOf(*task.view, task.pixels);
+    if (task.seen != nullptr && task.pixels > 0)
+        view.occlusion = std::make_shared<Occlusion>(*task.seen, nodes_.forest().lattice,
+                                                     nodes_.forest().grid);
     nodes_.look(view);
     if (task.only_look) {
         SplitCounts counts;

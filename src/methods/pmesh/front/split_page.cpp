@@ -65,10 +65,10 @@ uint32_t needs(const SplitView& view, const CriterionPage& page) {
         needed |= (bits & 0xffff) << at;
         surely |= (bits >> 16) << at;
     }
-    if (!view.hides_backs) return needed;
+    if (!view.hidesAny()) return needed;
     for (uint32_t maybe = needed & ~surely; maybe != 0; maybe &= maybe - 1) {
         const auto i = uint32_t(std::countr_zero(maybe));
-        if (view.facesAway(page.get(i))) needed &= ~(1u << i);
+        if (view.hides(page.get(i))) needed &= ~(1u << i);
     }
     return needed;
 }
