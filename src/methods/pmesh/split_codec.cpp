@@ -80,16 +80,18 @@ enum Column : size_t {
     kLeaves,               // below ends whose next split is in a child node
     kCornerV,              // of both triangles, where v has several leaves
     kCornerU,              // likewise
-    kCornerW,              // of the left one, or of the only one
-    kOtherW,               // of the right one, where both are
-    kOffset,               // six: u's, then what it takes to make v's
-    kNormal = kOffset + 6,  // four
-    kError = kNormal + 4,
-    kMin,                   // three
-    kMax = kMin + 3,        // three
-    kNormalBox = kMax + 3,  // three
-    kWord = kNormalBox + 3,  // of a colour eight, then of each scalar two
+    kCornerW,              // likewise, of all
+    kOffset,               // along each axis u's, then what it takes to make v's
+    kNormalV,              // in each byte
+    kNormalU,
+    kError,
+    kScale,
+    kReach,      // of the box along each axis: below, above
+    kNormalBox,  // along each axis
+    kWord,       // of a colour eight, then of each scalar two
 };
+/// In any column, of a node.
+constexpr uint32_t kMostNumbers = 6 * kSplitSlots;
 size_t columnCount(WordLayout layout) {
     return kWord + 8 * layout.colours + 2 * layout.scalars;
 }
@@ -187,7 +189,6 @@ void NodeCoder<kDecode>::codeChildren(uint32_t s, std::array<uint32_t, 3>& next)
 /// remain so until the range is known.
 template <bool kDecode>
 void NodeCoder<kDecode>::codeCorners(VertexSplit& split, uint32_t kinds) {
-    const bool both = (split.brings & 3) == 3;
     for (const uint32_t side : {0u, 1u}) {
         if ((split.brings >> side & 1) == 0) continue;
         VertexSplit::Corners& c = split.corner[side];
@@ -199,7 +200,7 @@ void NodeCoder<kDecode>::codeCorners(VertexSplit& split, uint32_t kinds) {
             w = before >= 0 ? uint32_t(before) << 1 | 1u
                             : uint32_t(c.w - int64_t(split.leaves[1])) << 1;
         }
-        number<32>(both && side == 1 ? kOtherW : kCornerW, w, 0, false);
+        number<32>(kCornerW, w, 0, false);
         if constexpr (kDecode) c.w = int32_t(w);
     }
 }
@@ -237,8 +238,8 @@ template <bool kDecode>
 void NodeCoder<kDecode>::codeOffsets(VertexSplit& split) {
     for (int k = 0; k < 3; ++k) {
         uint32_t u = uint32_t(split.offset[1][k]), v = uint32_t(split.offset[0][k]);
-        number<32>(kOffset + size_t(k), u, 0, true);
-        number<32>(kOffset + 3 + size_t(k), v, 0u - u, true);
+        number<32>(kOffset, u, 0, true);
+        number<32>(kOffset, v, 0u - u, true);
         split.offset[1][k] = int32_t(u);
         split.offset[0][k] = int32_t(v);
     }
@@ -253,37 +254,34 @@ void NodeCoder<kDecode>::codeNormals(VertexSplit& split, uint32_t s) {
                                 : s > 0  ? at(node_.split[s - 1].normal[0])
                                          : 0;
         uint32_t v = at(split.normal[0]), u = at(split.normal[1]);
-        number<8>(kNormal + byte / 8, v, before, true);
-        number<8>(kNormal + 2 + byte / 8, u, inside() ? 2 * before - v : v, true);
+        number<8>(kNormalV, v, before, true);
+        number<8>(kNormalU, u, inside() ? 2 * before - v : v, true);
         split.normal[0] = uint16_t((split.normal[0] & (0xff00u >> byte)) | v << byte);
         split.normal[1] = uint16_t((split.normal[1] & (0xff00u >> byte)) | u << byte);
     }
 }
 
-/// By how much it is smaller than the one above; or near the one before, of about the same size.
+/// Errors below the one above; or near the one before.
 template <bool kDecode>
 void NodeCoder<kDecode>::codeCriterion(VertexSplit& split, uint32_t s) {
-    NestedCriterion& c = split.criterion;
-    const NestedCriterion first{};
-    const NestedCriterion& like = inside() ? node_.split[parent_.slot].criterion
-                                  : s > 0  ? node_.split[s - 1].criterion
-                                           : first;
+    LocalCriterion& c = split.criterion;
+    const LocalCriterion first{};
+    const LocalCriterion& like = inside() ? node_.split[parent_.slot].criterion
+                                 : s > 0  ? node_.split[s - 1].criterion
+                                          : first;
     uint32_t error = 0xffffu - c.error;
     number<16>(kError, error, 0xffffu - like.error, !inside());
     c.error = uint16_t(0xffffu - error);
+    number<8>(kScale, c.scale, like.scale, true);
     for (size_t k = 0; k < 3; ++k) {
-        number<16>(kMin + k, c.min[k], like.min[k], !inside());
-        uint32_t below = 0xffffu - c.max[k];
-        number<16>(kMax + k, below,
-                   0xffffu - (inside() ? like.max[k] : uint32_t(c.min[k]) + like.max[k] - like.min[k]),
-                   !inside());
-        c.max[k] = uint16_t(0xffffu - below);
+        number<8>(kReach, c.below[k], 0, false);
+        number<8>(kReach, c.above[k], 0, false);
         // Of what lies above, the normals are no fewer.
         const int32_t low = inside() ? like.normals.low(k) : -NormalBox::kUnit;
         const int32_t high = inside() ? like.normals.high(k) : NormalBox::kUnit;
         uint32_t code = uint32_t(c.normals.low(k) - low) & 15u;
         code |= (uint32_t(high - c.normals.high(k)) & 15u) << 4;
-        number<8>(kNormalBox + k, code, 0, false);
+        number<8>(kNormalBox, code, 0, false);
         if (kDecode) c.normals.set(k, low + int32_t(code & 15u), high - int32_t(code >> 4 & 15u));
     }
 }
@@ -381,7 +379,7 @@ bool decodeSplitNode(std::span<const std::byte> bytes, const SplitRow& row, Word
     node.layout = layout;
     node.word.assign(2 * layout.words() * node.split.size(), 0);
     Columns& columns = threadColumns(columnCount(layout));
-    if (!columns.read(reader, 2 * kSplitSlots, fault)) return false;
+    if (!columns.read(reader, kMostNumbers, fault)) return false;
     if (!NodeCoder<true>(columns, node).run())
         return fault = "its columns do not fit each other", false;
     fault = faultOf(row, node);

@@ -23,14 +23,14 @@ SplitGrid gridOf(const Box3i& box) {
 }
 
 /// What a frontier states: large errors, which are few, apart from small ones, and these by place.
-std::vector<NestedCriterion> partsOf(std::span<const VertexSplit> frontier) {
+std::vector<NestedCriterion> partsOf(std::span<const NestedCriterion> frontier) {
     constexpr std::array<uint32_t, 4> kShare{16, 4, 2, 1};  // of errors: this part, beyond the last
     constexpr size_t kWhole = 24;                           // splits that are not parted
     std::vector<NestedCriterion> parts;
     std::vector<uint32_t> order(frontier.size());
     std::iota(order.begin(), order.end(), 0u);
     const auto criterion = [&](uint32_t i) -> const NestedCriterion& {
-        return frontier[i].criterion;
+        return frontier[i];
     };
     const auto join = [&](std::span<uint32_t> some) {
         NestedCriterion c = criterion(some[0]);
@@ -167,7 +167,7 @@ VertexSplit Encoder::encodeSplit(const PackedSlot& slot, const CollapseShape& r)
     if (r.closed) split.brings |= VertexSplit::kClosed;
     split.normal = r.normal;
     for (const size_t end : {0u, 1u}) split.offset[end] = r.position[end] - r.merged;
-    split.criterion = criterionOf(r);
+    split.criterion = LocalCriterion::of(criterionOf(r), r.merged, forest_.grid);
     return split;
 }
 
@@ -177,8 +177,12 @@ void Encoder::encodeNode(NodeIndex n) {
     node.frontier = packed.frontier;
     node.layout = forest_.layout;
     std::array<uint32_t, 3> next{packed.frontier, 0, 0};
+    std::vector<NestedCriterion> frontier;
     for (const PackedSlot& slot : packed.slot) {
-        VertexSplit split = encodeSplit(slot, shapes_[slot.record]);
+        const CollapseShape shape = shapes_[slot.record];
+        VertexSplit split = encodeSplit(slot, shape);
+        if (frontier.size() < node.frontier)
+            frontier.push_back(split.criterion.at(shape.merged, forest_.grid));
         for (const int end : {0, 1}) {
             const uint32_t kind = slot.kinds >> (2 * end) & 3;
             if (kind > 0)
@@ -192,7 +196,7 @@ void Encoder::encodeNode(NodeIndex n) {
         uint32_t count = 0;
         std::array<NestedCriterion, kMostParts> part;
     } parts;
-    for (const NestedCriterion& part : partsOf(std::span(node.split).first(node.frontier))) {
+    for (const NestedCriterion& part : partsOf(frontier)) {
         packed.row.criterion = parts.count == 0 ? part : packed.row.criterion.joined(part);
         parts.part[parts.count++] = part;
     }

@@ -10,6 +10,12 @@ namespace {
 
 constexpr int32_t kFarthest = 1 << 22;  ///< more than any lattice is wide
 
+/// As far as it can be told without places.
+bool mayEnclose(const LocalCriterion& outer, const LocalCriterion& inner) {
+    return outer.error >= inner.error && outer.scale >= inner.scale &&
+           outer.normals.encloses(inner.normals);
+}
+
 /// Checks the slots in their order; what each refers to must be the next that is not yet.
 class NodeChecker {
 public:
@@ -39,11 +45,10 @@ public:
 
 private:
     std::string splitFault(const VertexSplit& split, size_t slot) {
-        const NestedCriterion& c = split.criterion;
+        const LocalCriterion& c = split.criterion;
         if (c.error == 0 || c.error >= NestedCriterion::kEver) return "its error is no number";
-        for (size_t k = 0; k < 3; ++k)
-            if (c.min[k] > c.max[k]) return "its box is empty";
-        if (!row_.criterion.encloses(c)) return "its criterion exceeds its node's";
+        if (c.scale > LocalCriterion::kMostScale) return "its box is none of this grid";
+        if (c.error > row_.criterion.error) return "its error exceeds its node's";
         if (uint64_t(split.leaves[0]) + split.leaves[1] >= 1u << 31) return "it has too many leaves";
         for (const uint32_t side : {0u, 1u}) {
             if ((split.brings >> side & 1) == 0) continue;
@@ -71,7 +76,8 @@ private:
         const VertexSplit& child = node_.split[at];
         if (uint64_t(child.leaves[0]) + child.leaves[1] != split.leaves[end])
             return "its leaves are not its child's";
-        if (!split.criterion.encloses(child.criterion)) return "its child's criterion exceeds its own";
+        if (!mayEnclose(split.criterion, child.criterion))
+            return "its child's criterion exceeds its own";
         return "";
     }
 
@@ -100,14 +106,8 @@ std::string faultBetween(const SplitRow& parent_row, const SplitNode& parent, No
             const VertexSplit& below = node.split[slot];
             if (uint64_t(below.leaves[0]) + below.leaves[1] != split.leaves[end])
                 return fmt::format("split {}: its leaves are not what its parent knows", slot);
-            if (!split.criterion.encloses(below.criterion))
+            if (!mayEnclose(split.criterion, below.criterion))
                 return fmt::format("split {}: its criterion exceeds its parent's", slot);
-            const auto& parts = parent.child_parts[side];
-            if (std::none_of(parts.begin(), parts.end(), [&](const NestedCriterion& part) {
-                    return part.encloses(below.criterion);
-                }))
-                return fmt::format("split {}: its criterion exceeds what its node's parent states",
-                                   slot);
         }
     if (count != node.frontier)
         return fmt::format("{} splits are referred to, not {}", count, node.frontier);

@@ -10,7 +10,8 @@
 namespace pietra::pmesh {
 
 /// The first fault in a sentence, or empty. Of a node by itself and its row (whose own indices are
-/// known to be good): counts, the order of slots, leaves, ranges and criteria.
+/// known to be good): counts, the order of slots, leaves, ranges, errors and normals; whether boxes
+/// nest depends on where the node is.
 [[nodiscard]] std::string faultOf(const SplitRow& row, const SplitNode& node);
 /// Of a node and its parent, each without fault: that they agree on what lies between them.
 [[nodiscard]] std::string faultBetween(const SplitRow& parent_row, const SplitNode& parent,

@@ -22,6 +22,13 @@ struct FromAbove {
     Leaf first;
     Vec3i position;  ///< of the unsplit vertex
     bool is_live;    ///< which is there, if all above are applied
+    NestedCriterion within;  ///< of the split above
+};
+
+/// A node that is referred to.
+struct Waiting {
+    std::vector<FromAbove> frontier;
+    std::vector<NestedCriterion> parts;  ///< SplitNode::child_parts
 };
 
 /// A set of leaves, and the place of each in it.
@@ -62,10 +69,13 @@ public:
     MeshCut cut(const CutRequest& request, Budget& budget) override;
 
 private:
-    /// is_applied(split, name) of every split whose vertex is there, parents first; then, where it
-    /// is, visit(node, slot, FromAbove, true), else with false.
+    /// is_applied(split, FromAbove) of every split whose vertex is there, parents first; then
+    /// visit(node, slot, FromAbove, whether it is, the parts of the frontier it is in).
     template <class IsApplied, class Visit>
     void walk(Budget& budget, IsApplied&& is_applied, Visit&& visit) const;
+    NestedCriterion criterionOf(const VertexSplit& split, const FromAbove& from) const {
+        return split.criterion.at(from.position, forest_.grid);
+    }
     float errorOf(uint16_t error) const {
         return NestedCriterion::errorOf(error) * float(forest_.grid.unit(forest_.lattice));
     }
@@ -78,13 +88,15 @@ private:
 
 template <class IsApplied, class Visit>
 void Model::walk(Budget& budget, IsApplied&& is_applied, Visit&& visit) const {
-    std::unordered_map<NodeIndex, std::vector<FromAbove>> waiting;
+    std::unordered_map<NodeIndex, Waiting> waiting;
     std::vector<Reservation> memory;
     size_t references = 0, reserved = 0;
     Leaf first = 0;
     for (const SplitBase::Root& root : forest_.base.root) {
         if (root.split != kNoSplit) {
-            waiting[nodeOfSplit(root.split)].push_back({first, root.vertex.position, true});
+            const NodeIndex n = nodeOfSplit(root.split);
+            waiting[n].frontier.push_back(
+                {first, root.vertex.position, true, forest_.row[n].criterion});
             ++references;
         }
         first += root.leaves;
@@ -107,8 +119,9 @@ void Model::walk(Budget& budget, IsApplied&& is_applied, Visit&& visit) const {
             [&](const SplitNode& node) {
                 const NodeIndex n = level[taken++];
                 const SplitRow& row = forest_.row[n];
-                std::vector<FromAbove> from = std::move(waiting.at(n));
+                Waiting above = std::move(waiting.at(n));
                 waiting.erase(n);
+                std::vector<FromAbove>& from = above.frontier;
                 references -= from.size();
                 if (from.size() != node.frontier)
                     throw InputError::atByte(reader_.path(), reader_.page(n).offset,
@@ -122,12 +135,16 @@ void Model::walk(Budget& budget, IsApplied&& is_applied, Visit&& visit) const {
                     if (name >= leaves_)
                         throw InputError::atByte(reader_.path(), reader_.page(n).offset,
                                                  "it has too many leaves");
-                    const bool applied = from[s].is_live && is_applied(split, name);
-                    if (from[s].is_live) visit(node, s, from[s], applied);
+                    const bool applied = from[s].is_live && is_applied(split, from[s]);
+                    const NestedCriterion own = criterionOf(split, from[s]);
+                    if (from[s].is_live)
+                        visit(node, s, from[s], applied,
+                              s < node.frontier ? std::span<const NestedCriterion>(above.parts)
+                                                : std::span<const NestedCriterion>());
                     for (const size_t end : {0u, 1u}) {
                         if (split.child[end] == kNoChildSplit) continue;
                         const FromAbove child{end == 0 ? from[s].first : name,
-                                              from[s].position + split.offset[end], applied};
+                                              from[s].position + split.offset[end], applied, own};
                         const size_t where = split.child[end] / kSplitSlots;
                         if (where == 0) {
                             from[split.child[end]] = child;
@@ -141,7 +158,8 @@ void Model::walk(Budget& budget, IsApplied&& is_applied, Visit&& visit) const {
                     if (any_live[side]) {
                         references += below[side].size();
                         next.push_back(row.child[side]);
-                        waiting[row.child[side]] = std::move(below[side]);
+                        waiting[row.child[side]] = {std::move(below[side]),
+                                                    node.child_parts[side]};
                     }
                 constexpr size_t kMore = 1 << 12;
                 for (; references > reserved; reserved += kMore)
@@ -169,8 +187,9 @@ std::string Model::modelFault(Budget& budget) {
     std::string fault;
     uint64_t splits = 0;
     walk(
-        budget, [](const VertexSplit&, Leaf) { return true; },
-        [&](const SplitNode& node, uint32_t s, const FromAbove& from, bool) {
+        budget, [](const VertexSplit&, const FromAbove&) { return true; },
+        [&](const SplitNode& node, uint32_t s, const FromAbove& from, bool,
+            std::span<const NestedCriterion> parts) {
             const VertexSplit& split = node.split[s];
             ++splits;
             for (const size_t side : {0u, 1u}) {
@@ -179,6 +198,13 @@ std::string Model::modelFault(Budget& budget) {
                 if ((split.brings >> side & 1) && (w < 0 || w >= int64_t(leaves_)))
                     fault = "a triangle has a corner that is no leaf";
             }
+            const NestedCriterion own = criterionOf(split, from);
+            if (!from.within.encloses(own))
+                fault = "a split's criterion exceeds that of the one above";
+            if (!parts.empty() &&
+                std::none_of(parts.begin(), parts.end(),
+                             [&](const NestedCriterion& part) { return part.encloses(own); }))
+                fault = "a split's criterion exceeds what its node's parent states";
         });
     uint64_t expected = 0;
     for (const SplitRow& row : forest_.row) expected += row.splits;
@@ -191,8 +217,9 @@ std::string Model::modelFault(Budget& budget) {
 uint16_t Model::errorFor(uint64_t max_triangles, Budget& budget) const {
     std::vector<uint64_t> brought(size_t(NestedCriterion::kEver) + 1);
     walk(
-        budget, [](const VertexSplit&, Leaf) { return true; },
-        [&](const SplitNode& node, uint32_t s, const FromAbove&, bool) {
+        budget, [](const VertexSplit&, const FromAbove&) { return true; },
+        [&](const SplitNode& node, uint32_t s, const FromAbove&, bool,
+            std::span<const NestedCriterion>) {
             const VertexSplit& split = node.split[s];
             brought[split.criterion.error] += (split.brings & 1u) + (split.brings >> 1 & 1u);
         });
@@ -219,10 +246,10 @@ MeshCut Model::cut(const CutRequest& request, Budget& budget) {
     else if (request.max_error)
         least_error = *request.max_error - finest;
     const bool by_view = request.view.has_value() && !request.max_triangles && request.pixels > 0;
-    const auto needs = [&](const VertexSplit& split) {
-        const NestedCriterion& c = split.criterion;
-        if (by_view) return view.needs(c);
-        return c.error > least && double(errorOf(c.error)) > least_error;
+    const auto needs = [&](const VertexSplit& split, const FromAbove& from) {
+        if (by_view) return view.needs(criterionOf(split, from));
+        const uint16_t error = split.criterion.error;
+        return error > least && double(errorOf(error)) > least_error;
     };
 
     constexpr const char* kWhat = "a cut of a progressive mesh";
@@ -234,9 +261,9 @@ MeshCut Model::cut(const CutRequest& request, Budget& budget) {
         first += root.leaves;
     }
     size_t triangles = forest_.base.triangle.size();
-    walk(
-        budget, [&](const VertexSplit& split, Leaf) { return needs(split); },
-        [&](const SplitNode& node, uint32_t s, const FromAbove& from, bool applied) {
+    using Parts = std::span<const NestedCriterion>;
+    walk(budget, needs,
+        [&](const SplitNode& node, uint32_t s, const FromAbove& from, bool applied, Parts) {
             if (!applied) return;
             const VertexSplit& split = node.split[s];
             active.add(from.first + split.leaves[0]);
@@ -276,8 +303,10 @@ MeshCut Model::cut(const CutRequest& request, Budget& budget) {
     // Parents first: of what is put in one place the last one stays.
     walk(
         budget,
-        [&](const VertexSplit&, Leaf name) { return active.has(name); },
-        [&](const SplitNode& node, uint32_t s, const FromAbove& from, bool applied) {
+        [&](const VertexSplit& split, const FromAbove& from) {
+            return active.has(from.first + split.leaves[0]);
+        },
+        [&](const SplitNode& node, uint32_t s, const FromAbove& from, bool applied, Parts) {
             const VertexSplit& split = node.split[s];
             if (!applied) {
                 next_error[active.placeOf(from.first)] = split.criterion.error;

@@ -3,7 +3,7 @@
 // adaptive_model.h). A cut is what a view or an error needs, by the same rule as at run time; nodes
 // are read parents first, those only that have a part in it, and kept while they are looked at.
 //
-// Memory of a cut: its mesh, 24 bytes a triangle and 20 a vertex; 1.5 bits a leaf; and 20 bytes a
+// Memory of a cut: its mesh, 24 bytes a triangle and 20 a vertex; 1.5 bits a leaf; and 40 bytes a
 // split that a node read has in its children. MemoryError where the budget has less.
 
 #include <memory>

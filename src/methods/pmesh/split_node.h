@@ -99,6 +99,56 @@ struct SplitGrid {
     bool operator==(const SplitGrid&) const = default;
 };
 
+/// What a split states. Its box reaches, in multiples of 2^scale units, so far from the unsplit
+/// vertex's cell of that size; a larger box has no smaller scale, so boxes that are rounded outwards
+/// to such cells are nested as they were before.
+struct LocalCriterion {
+    std::array<uint8_t, 3> below{}, above{};
+    uint8_t scale = 0;
+    NormalBox normals;
+    uint16_t error = 0;
+    static constexpr int kMostScale = 16, kScaleBits = 5;
+    NestedCriterion at(const Vec3i& position, const SplitGrid& grid) const {
+        const Vec3i cell = cellOf(position, grid) >> int(scale);
+        NestedCriterion c;
+        for (size_t k = 0; k < 3; ++k) {
+            // Wherever damage takes the vertex, it is a number.
+            const auto unit = [&](int32_t cells) {
+                return uint16_t(std::clamp(int64_t(cells) << scale, int64_t(0), int64_t(0xffff)));
+            };
+            c.min[k] = unit(cell[int(k)] - int32_t(below[k]));
+            c.max[k] = unit(cell[int(k)] + int32_t(above[k]));
+        }
+        c.error = error;
+        c.normals = normals;
+        return c;
+    }
+    /// Of a box that has the vertex's cell in it.
+    static LocalCriterion of(const NestedCriterion& c, const Vec3i& position,
+                             const SplitGrid& grid) {
+        LocalCriterion local;
+        int32_t size = 0;
+        for (size_t k = 0; k < 3; ++k) size = std::max(size, int32_t(c.max[k]) - c.min[k]);
+        local.scale = uint8_t(std::max(int(std::bit_width(uint32_t(size))) - kScaleBits, 0));
+        const Vec3i cell = cellOf(position, grid) >> int(local.scale);
+        for (size_t k = 0; k < 3; ++k) {
+            const int32_t up = (1 << local.scale) - 1;
+            local.below[k] = uint8_t(cell[int(k)] - (c.min[k] >> local.scale));
+            local.above[k] = uint8_t(((c.max[k] + up) >> local.scale) - cell[int(k)]);
+        }
+        local.error = c.error;
+        local.normals = c.normals;
+        return local;
+    }
+    bool operator==(const LocalCriterion&) const = default;
+
+private:
+    static Vec3i cellOf(const Vec3i& position, const SplitGrid& grid) {
+        constexpr int32_t kFar = 1 << 24;
+        return (glm::clamp(position, -kFar, kFar) - grid.origin) >> grid.shift;
+    }
+};
+
 /// A normal in two bytes: the octahedron's coordinates to 7 bits and sign.
 constexpr uint16_t packNormal(OctNormal n) {
     const auto narrow = [](int32_t x) {
@@ -137,7 +187,7 @@ struct VertexSplit {
     static constexpr uint8_t kClosed = 4;  ///< they are of a closed component
     std::array<uint16_t, 2> normal;        ///< of v and u after it
     std::array<Vec3i, 2> offset;           ///< from the unsplit vertex to v and u, in steps, exact
-    NestedCriterion criterion;
+    LocalCriterion criterion;
     bool operator==(const VertexSplit&) const = default;
 };
 

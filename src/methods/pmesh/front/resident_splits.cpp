@@ -44,7 +44,8 @@ ResidentSplits::ResidentSplits(SplitForest forest, uint32_t most)
         loaded_.push_back(n);
         root_criterion_.resize(splitId(n + 1, 0));
         for (uint32_t s = 0; s < forest_.node[n].frontier; ++s)
-            root_criterion_[splitId(n, s)] = forest_.node[n].split[s].criterion;
+            root_criterion_[splitId(n, s)] = forest_.node[n].split[s].criterion.at(
+                before[n][s].position, forest_.grid);
     }
     forest_.node = {};
 }
@@ -96,7 +97,8 @@ std::unique_ptr<ResidentSplits::Loaded> ResidentSplits::placed(
             const uint32_t slot = split.child[end] % kSplitSlots;
             if (where == 0) {
                 to.child[end] = splitId(index, slot);
-                to.criterion[end] = node.split[slot].criterion;
+                to.criterion[end] =
+                    node.split[slot].criterion.at(to.vertex[end].position, forest_.grid);
                 first[slot] = end == 0 ? first[s] : to.name;
                 from[slot] = to.vertex[end];
             } else {
@@ -207,8 +209,10 @@ std::optional<std::vector<ResidentSplits::Arrived>> ResidentSplits::arrive(NodeI
     std::vector<Arrived> arrived;
     for (uint32_t s = 0; s < node.frontier; ++s) {
         const Reference& r = above.reference[side][s];
-        above.split[r.slot].criterion[r.end] = node.split[s].criterion;
-        arrived.push_back({r.first, splitId(index, s), node.split[s].criterion});
+        const NestedCriterion criterion =
+            node.split[s].criterion.at(before[s].position, forest_.grid);
+        above.split[r.slot].criterion[r.end] = criterion;
+        arrived.push_back({r.first, splitId(index, s), criterion});
     }
     loaded->position = uint32_t(loaded_.size());
     loaded_.push_back(index);

@@ -35,9 +35,16 @@ struct Made {
         criterion.resize(leaves);
         // Nodes one by one, as they would arrive.
         const ResidentSplits nodes = all();
+        for (const SplitBase::Root& root : forest.base.root)
+            if (root.split != kNoSplit)
+                criterion[nodes.at(root.split).name] = nodes.rootCriterion(root.split);
         for (NodeIndex n = 0; n < forest.row.size(); ++n)
-            for (uint32_t s = 0; s < forest.node[n].split.size(); ++s)
-                criterion[nodes.at(splitId(n, s)).name] = forest.node[n].split[s].criterion;
+            for (uint32_t s = 0; s < forest.node[n].split.size(); ++s) {
+                const ResidentSplit& split = nodes.at(splitId(n, s));
+                for (const size_t end : {0u, 1u})
+                    if (split.child[end] != kNoSplit)
+                        criterion[nodes.at(split.child[end]).name] = split.criterion[end];
+            }
     }
     ResidentSplits all() const {
         ResidentSplits nodes(roots(), ~0u);
@@ -246,7 +253,8 @@ TEST_P(EachForest, WhateverIsThereEveryFrameIsOneMesh) {
             const size_t vertices = front.vertexCount();
             const SplitCounts counts = front.adapt(view, limits);
             EXPECT_LE(front.vertexCount(), std::max(vertices, limits.vertices));
-            EXPECT_LE(counts.splits, std::max<size_t>(limits.splits, 1) + 200 * (limits.splits < 100));
+            // What the eye is in the boxes of is needed at any tolerance, all or nothing.
+            EXPECT_LE(counts.splits, std::max<size_t>(limits.splits, 500));
             limited += counts.short_of_splits || counts.short_of_vertices;
             const std::vector<bool> applied = appliedIn(made, front);
             if (made.log.collapse.size() < 3000 || frame % 8 == 3) {
