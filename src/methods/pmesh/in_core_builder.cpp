@@ -85,16 +85,21 @@ SplitForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget, Build
     TempSpace space{"", &budget, 0};
     Collapses collapses(space);
     takeCollapses(recorder, base, collapses);
-    SplitForest forest;
+    return encodeInMemory(collapses, lattice, space, c);
+}
+
+SplitForest encodeInMemory(const Collapses& collapses, const Lattice& lattice, TempSpace& space,
+                           BuildCounts& counts) {
     std::vector<SplitNode> nodes;
     std::vector<SplitRow> rows;
-    forest = encodeSplits(collapses, lattice, space, c,
-                          [&](NodeIndex n, const SplitRow& row, const SplitGrid&, SplitNode& node) {
-                              nodes.resize(std::max<size_t>(nodes.size(), n + 1));
-                              rows.resize(nodes.size());
-                              nodes[n] = std::move(node);
-                              rows[n] = row;
-                          });
+    SplitForest forest = encodeSplits(
+        collapses, lattice, space, counts,
+        [&](NodeIndex n, const SplitRow& row, const SplitGrid&, SplitNode& node) {
+            nodes.resize(std::max<size_t>(nodes.size(), n + 1));
+            rows.resize(nodes.size());
+            nodes[n] = std::move(node);
+            rows[n] = row;
+        });
     forest.node = std::move(nodes);
     forest.row = std::move(rows);
     return forest;

@@ -21,6 +21,10 @@ inline constexpr size_t kBuildBytes = 800;
 SplitForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
                        BuildCounts* counts = nullptr);
 
+/// encodeSplits() with all nodes in memory.
+SplitForest encodeInMemory(const Collapses& collapses, const Lattice& lattice, TempSpace& space,
+                           BuildCounts& counts);
+
 /// The simplification alone: `sink` makes who is told in the recorder's place, and tells it.
 void collapseInCore(
     Mesh mesh, const Lattice& lattice, Budget& budget,

@@ -74,13 +74,16 @@ inline std::vector<TestMesh> testMeshes() {
     };
 }
 
-/// By diamonds, into a file; positions are the lattice.
-inline BuildReport buildFile(const Mesh& mesh, uint32_t leaf_triangles, const std::string& path) {
+/// Positions are the lattice.
+inline MemorySource sourceOf(const Mesh& mesh) {
     std::vector<Vec3d> positions;
     for (const Vec3i& p : mesh.position) positions.push_back(Vec3d(p));
     std::vector<MemorySource::Index> triangles;
     for (const Triangle& t : mesh.triangle) triangles.push_back({t[0], t[1], t[2]});
-    MemorySource source(positions, triangles);
+    return MemorySource(positions, triangles);
+}
+
+inline BuildSettings smallDiamonds(uint32_t leaf_triangles, const std::string& path) {
     BuildSettings settings;
     settings.output = path;
     settings.force = true;
@@ -90,8 +93,14 @@ inline BuildReport buildFile(const Mesh& mesh, uint32_t leaf_triangles, const st
     settings.leaf_triangles = leaf_triangles;
     settings.patch_triangles = leaf_triangles;
     settings.precision = {PrecisionSetting::Kind::kStep, 1.0};
+    return settings;
+}
+
+/// By diamonds, into a file.
+inline BuildReport buildFile(const Mesh& mesh, uint32_t leaf_triangles, const std::string& path) {
+    MemorySource source = sourceOf(mesh);
     Progress progress;
-    return build(source, settings, progress);
+    return build(source, smallDiamonds(leaf_triangles, path), progress);
 }
 
 }  // namespace pietra::pmesh

@@ -69,6 +69,17 @@ TEST_P(EachForest, TheTableEnclosesItsNodes) {
     }
 }
 
+/// So little that leaves are brought to wings a thousand at a time.
+TEST_P(EachForest, DoesNotDependOnMemory) {
+    const Mesh mesh = GetParam().make();
+    const SplitForest forest = forestOf(mesh);
+    Budget budget(kBuildBytes * mesh.triangleCount() + 8000);
+    const SplitForest same = buildInCore(mesh, Lattice{}, budget);
+    EXPECT_TRUE(same.base == forest.base);
+    EXPECT_TRUE(same.row == forest.row);
+    EXPECT_TRUE(same.node == forest.node);
+}
+
 /// Any byte, and any length. What is only another number is found by the file's checksums.
 TEST(SplitCodec, RefusesWhatIsDamaged) {
     const SplitForest forest = forestOf(onLattice(dented(test::sphereShape(24), 0.01), 900));

@@ -2,6 +2,7 @@
 
 #include "methods/pmesh/front/split_front.h"
 
+#include <numeric>
 #include <random>
 
 #include "methods/pmesh/collapse_log.h"
@@ -10,23 +11,43 @@
 namespace pietra::pmesh {
 namespace {
 
-std::vector<TestMesh> meshes() {
+/// In core, or by diamonds of so few triangles.
+struct ForestMesh {
+    TestMesh mesh;
+    uint32_t leaf_triangles = 0;
+    std::string name() const {
+        return leaf_triangles > 0 ? std::string(mesh.name) + "_by_diamonds" : mesh.name;
+    }
+};
+
+std::vector<ForestMesh> meshes() {
     std::vector<TestMesh> all = testMeshes();
     all.push_back({"sheet", [] { return onLattice(test::gridShape(90, 0.1), 5000); }});
     all.push_back({"large_ball", [] {
                        return onLattice(dented(test::sphereShape(64), 0.01), 1 << 20);
                    }});
-    return all;
+    std::vector<ForestMesh> both;
+    for (const TestMesh& mesh : all)
+        for (const uint32_t leaf_triangles : {0u, 100u}) both.push_back({mesh, leaf_triangles});
+    return both;
 }
 
 struct Made {
-    explicit Made(const Mesh& mesh) {
-        Budget budget(size_t(1) << 30);
-        log = logCollapses(mesh, Lattice{}, budget);
-        BuildCounts counts;
-        counts.leaf_of.resize(mesh.vertexCount());
-        forest = buildInCore(mesh, Lattice{}, budget, &counts);
-        leaf_of = counts.leaf_of;
+    explicit Made(const Mesh& mesh, uint32_t leaf_triangles = 0) {
+        if (leaf_triangles > 0) {
+            DiamondLog made = logDiamonds(mesh, leaf_triangles);
+            log = std::move(made.log);
+            forest = std::move(made.forest);
+            leaf_of.resize(log.input.vertexCount());
+            std::iota(leaf_of.begin(), leaf_of.end(), Leaf(0));
+        } else {
+            Budget budget(size_t(1) << 30);
+            log = logCollapses(mesh, Lattice{}, budget);
+            BuildCounts counts;
+            counts.leaf_of.resize(mesh.vertexCount());
+            forest = buildInCore(mesh, Lattice{}, budget, &counts);
+            leaf_of = counts.leaf_of;
+        }
         // A collapse has the name of u's first leaf.
         for (const CollapseLog::Collapse& c : log.collapse) name.push_back(leaf_of[c.u]);
         size_t leaves = 0;
@@ -130,50 +151,26 @@ Named namedOf(const SplitFront& front, const SplitForest& forest) {
 /// All collapses but some, in their order. Each must find the very star that it had when everything
 /// was collapsed.
 Named collapsed(const Made& made, const std::vector<bool>& undone) {
-    const size_t count = made.log.input.vertexCount();
-    std::vector<uint32_t> into(count);
-    for (uint32_t v = 0; v < count; ++v) into[v] = v;
-    std::vector<SplitVertex> now(count);
-    for (size_t v = 0; v < count; ++v)
-        now[v] = {made.log.input.position[v], packNormal(made.log.input.normal[v])};
-    std::vector<Triangle> triangle = made.log.input.triangle;
-    std::vector<std::set<uint32_t>> around(count);
-    for (uint32_t t = 0; t < triangle.size(); ++t)
-        for (const uint32_t v : triangle[t]) around[v].insert(t);
+    const Mesh& input = made.log.input;
+    std::map<uint32_t, SplitVertex> now;
+    for (uint32_t v = 0; v < input.vertexCount(); ++v)
+        now[v] = {input.position[v], packNormal(input.normal[v])};
+    Replay replay(input);
     for (size_t i = 0; i < made.log.collapse.size(); ++i) {
         const CollapseLog::Collapse& c = made.log.collapse[i];
         if (undone[i]) continue;
         EXPECT_EQ(now[c.v], c.before[0]);
         EXPECT_EQ(now[c.u], c.before[1]);
-        std::set<uint32_t> ring, gone;
-        for (const uint32_t end : {c.v, c.u})
-            for (const uint32_t t : around[end])
-                for (const uint32_t w : triangle[t]) {
-                    if (w != c.v && w != c.u) ring.insert(w);
-                    if (w != end && (w == c.v || w == c.u)) gone.insert(t);
-                }
-        EXPECT_EQ(ring, std::set<uint32_t>(c.neighbour.begin(), c.neighbour.end()));
-        EXPECT_EQ(gone, std::set<uint32_t>(c.triangle.begin(), c.triangle.end()));
-        for (const uint32_t t : gone)
-            for (const uint32_t w : triangle[t]) around[w].erase(t);
-        for (const uint32_t t : around[c.u]) {
-            for (uint32_t& w : triangle[t])
-                if (w == c.u) w = c.v;
-            around[c.v].insert(t);
-        }
-        around[c.u].clear();
-        into[c.u] = c.v;
+        EXPECT_EQ(replay.ring(c.v, c.u), c.neighbour);
+        EXPECT_EQ(replay.wings(c.v, c.u), c.triangle);
+        replay.collapse(c.v, c.u);
+        now.erase(c.u);
         now[c.v] = c.after;
     }
     Named named;
-    for (uint32_t v = 0; v < count; ++v)
-        if (into[v] == v)
-            named.vertex[made.leaf_of[v]] = now[v];
-    std::set<uint32_t> left;
-    for (const auto& a : around) left.insert(a.begin(), a.end());
-    for (const uint32_t t : left)
-        named.add({made.leaf_of[triangle[t][0]], made.leaf_of[triangle[t][1]],
-                   made.leaf_of[triangle[t][2]]});
+    for (const auto& [v, vertex] : now) named.vertex[made.leaf_of[v]] = vertex;
+    for (const Triangle& t : replay.triangles())
+        named.add({made.leaf_of[t[0]], made.leaf_of[t[1]], made.leaf_of[t[2]]});
     std::sort(named.triangle.begin(), named.triangle.end());
     return named;
 }
@@ -194,12 +191,12 @@ std::vector<bool> appliedIn(const Made& made, const SplitFront& front) {
     return applied;
 }
 
-class EachForest : public testing::TestWithParam<TestMesh> {};
+class EachForest : public testing::TestWithParam<ForestMesh> {};
 INSTANTIATE_TEST_SUITE_P(SplitFront, EachForest, testing::ValuesIn(meshes()),
-                         [](const auto& test) { return std::string(test.param.name); });
+                         [](const auto& test) { return test.param.name(); });
 
 TEST_P(EachForest, EveryViewIsTheInputWithWhatItDoesNotNeedCollapsed) {
-    const Made made(GetParam().make());
+    const Made made(GetParam().mesh.make(), GetParam().leaf_triangles);
     ResidentSplits nodes = made.all();
     std::mt19937 random(5);
     std::vector<SplitView> views{wholeSplitView(true), wholeSplitView(false), wholeSplitView(true)};
@@ -235,7 +232,7 @@ TEST_P(EachForest, EveryViewIsTheInputWithWhatItDoesNotNeedCollapsed) {
 /// Nodes come late, in any order, and leave; the mesh is one that collapses reach, and once all has
 /// come, the one that is needed. Limits hold.
 TEST_P(EachForest, WhateverIsThereEveryFrameIsOneMesh) {
-    const Made made(GetParam().make());
+    const Made made(GetParam().mesh.make(), GetParam().leaf_triangles);
     std::mt19937 random(11);
     uint32_t waited = 0, limited = 0;
     for (const uint32_t most : {~0u, 12u}) {
