@@ -40,13 +40,13 @@ struct Sum {
         faces += front.triangleCount();
     }
     void print(const char* name, int frames) const {
-        std::printf("    %s: %8llu vertices %8llu faces %6llu operations (least %u):"
-                    " %.2f M/s of processor, %.2f M/s, %.2f ms\n",
-                    name, static_cast<unsigned long long>(vertices / frames),
-                    static_cast<unsigned long long>(faces / frames),
-                    static_cast<unsigned long long>(operations / frames), least,
-                    double(operations) / cpu * 1e-6, double(operations) / wall * 1e-6,
-                    wall / frames * 1e3);
+        std::printf(
+            "    %s: %8llu vertices %8llu faces %6llu operations (least %u):"
+            " %.2f M/s of processor, %.2f M/s, %.2f ms\n",
+            name, static_cast<unsigned long long>(vertices / frames),
+            static_cast<unsigned long long>(faces / frames),
+            static_cast<unsigned long long>(operations / frames), least,
+            double(operations) / cpu * 1e-6, double(operations) / wall * 1e-6, wall / frames * 1e3);
     }
 };
 
@@ -111,9 +111,10 @@ private:
             ns.push_back((processSeconds() - begin) * 1e9 / double(front_.vertexCount()));
         }
         std::sort(ns.begin(), ns.end());
-        std::printf("  hover at %.2f px: %zu vertices: median %.2f, 90 %% %.2f ns a vertex of "
-                    "processor time\n",
-                    pixels, front_.vertexCount(), ns[100], ns[180]);
+        std::printf(
+            "  hover at %.2f px: %zu vertices: median %.2f, 90 %% %.2f ns a vertex of "
+            "processor time\n",
+            pixels, front_.vertexCount(), ns[100], ns[180]);
     }
 
     const Lattice lattice_;

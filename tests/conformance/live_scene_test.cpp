@@ -579,7 +579,8 @@ TEST_P(LiveScene, holdsWhatItSaysAndGivesItBack) {
         EXPECT_EQ(released, said - live->bytes());
         EXPECT_LT(live->bytes(), 2 * least + held / 20);
         ::malloc_trim(0);
-        EXPECT_LE(residentNow() - before, live->bytes() + held / 6);  // scratch lists stay
+        // Construction's heaps may have shrunk since; scratch lists stay.
+        EXPECT_LE(residentNow(), before + live->bytes() + held / 6);
     }
 }
 

@@ -7,8 +7,8 @@
 #include <random>
 
 #include "io/triangle_source.h"
-#include "methods/pmesh/split_model.h"
 #include "methods/pmesh/pmesh_testing.h"
+#include "methods/pmesh/split_model.h"
 #include "methods/pmesh/whole_mesh.h"
 #include "simplify/deviation_testing.h"
 

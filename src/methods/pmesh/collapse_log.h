@@ -115,8 +115,8 @@ inline DiamondLog logDiamonds(const Mesh& mesh, uint32_t leaf_triangles) {
     MemorySource source = sourceOf(mesh);
     const BuildSettings settings = smallDiamonds(leaf_triangles, path);
     Progress progress;
-    Construction work(source, settings,
-                      {.name = "pmesh", .stages = 2, .mark_irregular = true}, progress);
+    Construction work(source, settings, {.name = "pmesh", .stages = 2, .mark_irregular = true},
+                      progress);
     Collapses collapses(work.space);
     collapseByDiamonds(work, settings, progress, collapses);
     BuildCounts counts;

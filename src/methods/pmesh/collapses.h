@@ -96,7 +96,7 @@ struct Collapses {
     explicit Collapses(TempSpace& space) : store(space) {}
     CollapseStore store;
     Mesh base;
-    std::vector<uint8_t> base_closed;  ///< one a triangle: 1 is surely of a closed component
+    std::vector<uint8_t> base_closed;     ///< one a triangle: 1 is surely of a closed component
     std::vector<FaceLeaves> base_leaves;  ///< of its triangles
     std::vector<VertexId> base_vertex;
     std::vector<uint32_t> base_last;  ///< the record each came from last, or kNoSplit

@@ -19,7 +19,8 @@ namespace {
 
 /// Records of a diamond before they have their final numbers.
 constexpr uint32_t kLocal = 1u << 31;
-/// That a diamond adds. Some would add 80, where collapses run along; those wait for the next level.
+/// That a diamond adds. Some would add 80, where collapses run along; those wait for the next
+/// level.
 constexpr uint32_t kMostHeights = 18;
 
 /// What a vertex carries from diamond to diamond, in the place of scalars.

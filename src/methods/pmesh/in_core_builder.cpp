@@ -92,22 +92,21 @@ SplitForest encodeInMemory(const Collapses& collapses, const Lattice& lattice, T
                            BuildCounts& counts) {
     std::vector<SplitNode> nodes;
     std::vector<SplitRow> rows;
-    SplitForest forest = encodeSplits(
-        collapses, lattice, space, counts,
-        [&](NodeIndex n, const SplitRow& row, const SplitGrid&, SplitNode& node) {
-            nodes.resize(std::max<size_t>(nodes.size(), n + 1));
-            rows.resize(nodes.size());
-            nodes[n] = std::move(node);
-            rows[n] = row;
-        });
+    SplitForest forest =
+        encodeSplits(collapses, lattice, space, counts,
+                     [&](NodeIndex n, const SplitRow& row, const SplitGrid&, SplitNode& node) {
+                         nodes.resize(std::max<size_t>(nodes.size(), n + 1));
+                         rows.resize(nodes.size());
+                         nodes[n] = std::move(node);
+                         rows[n] = row;
+                     });
     forest.node = std::move(nodes);
     forest.row = std::move(rows);
     return forest;
 }
 
-void collapseInCore(
-    Mesh mesh, const Lattice& lattice, Budget& budget,
-    const std::function<std::unique_ptr<CollapseSink>(Recorder& recorder)>& sink) {
+void collapseInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
+                    const std::function<std::unique_ptr<CollapseSink>(Recorder& recorder)>& sink) {
     const Reservation memory =
         budget.reserve(kBuildBytes * mesh.triangleCount(), "a simplification in memory");
     const std::vector<uint8_t> irregular = prepare(mesh);

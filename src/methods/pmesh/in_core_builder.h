@@ -19,15 +19,14 @@ inline constexpr size_t kBuildBytes = 800;
 /// `mesh`: welded, without degenerate or doubled triangles, with normals, all positions multiples
 /// of 2^lattice.shift; its edge classes are set here.
 SplitForest buildInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
-                       BuildCounts* counts = nullptr);
+                        BuildCounts* counts = nullptr);
 
 /// encodeSplits() with all nodes in memory.
 SplitForest encodeInMemory(const Collapses& collapses, const Lattice& lattice, TempSpace& space,
                            BuildCounts& counts);
 
 /// The simplification alone: `sink` makes who is told in the recorder's place, and tells it.
-void collapseInCore(
-    Mesh mesh, const Lattice& lattice, Budget& budget,
-    const std::function<std::unique_ptr<CollapseSink>(Recorder& recorder)>& sink);
+void collapseInCore(Mesh mesh, const Lattice& lattice, Budget& budget,
+                    const std::function<std::unique_ptr<CollapseSink>(Recorder& recorder)>& sink);
 
 }  // namespace pietra::pmesh

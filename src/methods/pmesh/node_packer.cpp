@@ -168,8 +168,7 @@ private:
 void Packer::addRoots(std::vector<Subtree> trees) {
     if (trees.size() <= kSplitSlots) {
         const NodeIndex node = addNode(kNoNode, 0, trees);
-        for (uint32_t s = 0; s < trees.size(); ++s)
-            root_[trees[s].operation] = splitId(node, s);
+        for (uint32_t s = 0; s < trees.size(); ++s) root_[trees[s].operation] = splitId(node, s);
         return;
     }
     const std::vector<uint8_t> side = cutter_.cutFreely(trees);
@@ -201,9 +200,8 @@ void Packer::fill(NodeIndex n) {
     reference_.clear();
     for (uint32_t s = 0; s < slots.size(); ++s) {
         const CollapseLink& link = known_.at(slots[s].record).link;
-        const uint32_t below_v = link.child[0] == kNoSplit
-                                     ? 0
-                                     : known_.at(link.child[0]).link.operations;
+        const uint32_t below_v =
+            link.child[0] == kNoSplit ? 0 : known_.at(link.child[0]).link.operations;
         const Leaf name = slots[s].first + below_v + 1;
         leaves_(link.u, name);
         for (const uint32_t end : {0u, 1u}) {
@@ -214,8 +212,7 @@ void Packer::fill(NodeIndex n) {
                 slots[s].kinds |= 1u << (2 * end);
                 slots.push_back({child, end == 0 ? slots[s].first : name, 0});
             } else {
-                reference_.push_back(
-                    subtree(child, end == 0 ? slots[s].first : name, known.link));
+                reference_.push_back(subtree(child, end == 0 ? slots[s].first : name, known.link));
                 beyond.push_back({s, end});
             }
         }

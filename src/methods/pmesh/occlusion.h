@@ -3,8 +3,8 @@
 // boxes behind the farthest that shows where they would.
 //
 // Monotone: a box within a hidden one is hidden. Its rectangle lies within the other's, so do the
-// tiles that cover it, of a level no coarser, and its nearest point is no nearer; and sums, products
-// and quotients that are monotone remain so when they are rounded.
+// tiles that cover it, of a level no coarser, and its nearest point is no nearer; and sums,
+// products and quotients that are monotone remain so when they are rounded.
 //
 // Of a point that shows, no box around is hidden. Outside of the picture nothing is.
 

@@ -140,8 +140,7 @@ bool Recorder::spreadClosed(const CollapsingStar& star) {
 }
 
 /// Its own part, and what those that it depends on state.
-void Recorder::enclose(const CollapseStep& step, const OrderedRing& ring,
-                       CollapseRecord& r) const {
+void Recorder::enclose(const CollapseStep& step, const OrderedRing& ring, CollapseRecord& r) const {
     uint32_t height = 0;
     const auto add = [&](uint32_t vertex) {
         const VertexHistory& h = history_[vertex];
@@ -209,15 +208,10 @@ bool Recorder::take(const CollapseStep& step) {
     r.normal = {packNormal(normal_[v]), packNormal(normal_[u])};
     normal_[v] = encodeNormal(decodeNormal(normal_[v]) + decodeNormal(normal_[u]));
     const uint32_t operations = r.leaves[0] + r.leaves[1] - 1;
-    link_.push_back(
-        {u, {history_[v].last, history_[u].last}, operations, r.error, r.box});
+    link_.push_back({u, {history_[v].last, history_[u].last}, operations, r.error, r.box});
     largest_ = std::max(largest_, uint32_t(r.height));
-    history_[v] = {first_record_ + uint32_t(record_.size()),
-                   r.height,
-                   operations,
-                   r.error,
-                   r.box,
-                   r.normals};
+    history_[v] = {
+        first_record_ + uint32_t(record_.size()), r.height, operations, r.error, r.box, r.normals};
     record_.push_back(r);
     return true;
 }

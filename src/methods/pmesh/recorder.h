@@ -6,8 +6,8 @@
 //   - that would make chains of dependencies too long.
 //
 // A collapse depends on the last one of each vertex around: its criterion encloses theirs, and its
-// height, the length of the longest chain, is one more. So both are known while collapsing, whatever
-// comes later and elsewhere.
+// height, the length of the longest chain, is one more. So both are known while collapsing,
+// whatever comes later and elsewhere.
 //
 // Of each face it knows which leaves its corners were in the input, by their places among the
 // leaves below the vertices that they are now: of a merged vertex those of v come first.
@@ -47,8 +47,8 @@ struct CollapseShape {
     std::array<uint16_t, 2> normal;  ///< of v and of u
     std::array<uint32_t, 2> leaves;  ///< the same
     /// Lattice units: the largest bound (surface_map.h) of the faces that this made; no less than
-    /// that of those it depends on. They are in the box, too, and their normals in the box of these,
-    /// where they are of a closed component.
+    /// that of those it depends on. They are in the box, too, and their normals in the box of
+    /// these, where they are of a closed component.
     float error;
     Box3i box;
     NormalBox normals;
@@ -88,9 +88,9 @@ public:
     /// where such have the rank kRankFixed; both must outlive this. Positions are multiples of
     /// 2^shift. All is taken for closed.
     Recorder(const Mesh& mesh, std::span<const uint8_t> irregular, int shift);
-    /// Goes on where others ended: `history` is that of the vertices, one each, `bound` and `leaves`
-    /// those of the faces, `closed` whether these are surely of a closed component; records of this
-    /// one are counted from `first_record` on.
+    /// Goes on where others ended: `history` is that of the vertices, one each, `bound` and
+    /// `leaves` those of the faces, `closed` whether these are surely of a closed component;
+    /// records of this one are counted from `first_record` on.
     Recorder(const Mesh& mesh, std::vector<VertexHistory> history, const std::vector<float>& bound,
              std::vector<FaceLeaves> leaves, std::vector<uint8_t> closed,
              const SurfaceMap::Effort& effort, uint32_t first_record, int shift);
@@ -123,7 +123,8 @@ public:
     OctNormal normalOf(uint32_t v) const { return normal_[v]; }
 
 private:
-    /// The neighbours of the merged vertex, counter-clockwise; where it is open, from the beginning.
+    /// The neighbours of the merged vertex, counter-clockwise; where it is open, from the
+    /// beginning.
     struct OrderedRing {
         std::array<uint32_t, kMaxNeighbours> vertex;
         uint32_t size = 0;

@@ -76,13 +76,13 @@ private:
 };
 
 enum Column : size_t {
-    kKinds,                // of both children, two bits each, and what it brings
-    kLeaves,               // below ends whose next split is in a child node
-    kCornerV,              // of both triangles, where v has several leaves
-    kCornerU,              // likewise
-    kCornerW,              // likewise, of all
-    kOffset,               // along each axis u's, then what it takes to make v's
-    kNormalV,              // in each byte
+    kKinds,    // of both children, two bits each, and what it brings
+    kLeaves,   // below ends whose next split is in a child node
+    kCornerV,  // of both triangles, where v has several leaves
+    kCornerU,  // likewise
+    kCornerW,  // likewise, of all
+    kOffset,   // along each axis u's, then what it takes to make v's
+    kNormalV,  // in each byte
     kNormalU,
     kError,
     kScale,
@@ -215,8 +215,7 @@ bool NodeCoder<kDecode>::addUp() {
             const uint16_t child = split.child[end];
             if (child < kSplitSlots) {
                 if (child >= node_.split.size() || child <= s) return false;
-                split.leaves[end] =
-                    node_.split[child].leaves[0] + node_.split[child].leaves[1];
+                split.leaves[end] = node_.split[child].leaves[0] + node_.split[child].leaves[1];
             }
             sum += split.leaves[end];
         }
@@ -341,11 +340,11 @@ void readParts(ByteReader& reader, std::vector<NestedCriterion>& parts) {
 
 /// Columns of a base: of roots, then of triangles, then of roots again.
 enum BaseColumn : size_t {
-    kPosition,                   // three
+    kPosition,  // three
     kBaseNormal = kPosition + 3,
     kBaseLeaves,
-    kBaseSplit,                  // 0: none, else the difference to the next one
-    kBaseCorner,                 // three: the root, and, above, the leaf in it
+    kBaseSplit,   // 0: none, else the difference to the next one
+    kBaseCorner,  // three: the root, and, above, the leaf in it
     kBaseLeaf = kBaseCorner + 3,
     kBaseClosed = kBaseLeaf + 3,
     kBaseWord
@@ -408,8 +407,8 @@ std::vector<std::byte> encodeSplitBase(const SplitForest& forest) {
     for (size_t t = 0; t < base.triangle.size(); ++t) {
         for (size_t k = 0; k < 3; ++k) {
             const Leaf leaf = base.triangle[t][k];
-            const auto root = uint32_t(
-                std::upper_bound(first.begin(), first.end(), leaf) - first.begin() - 1);
+            const auto root =
+                uint32_t(std::upper_bound(first.begin(), first.end(), leaf) - first.begin() - 1);
             columns.put(kBaseCorner + k, root);
             columns.put(kBaseLeaf + k, leaf - first[root]);
         }

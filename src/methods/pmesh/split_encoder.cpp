@@ -29,9 +29,7 @@ std::vector<NestedCriterion> partsOf(std::span<const NestedCriterion> frontier) 
     std::vector<NestedCriterion> parts;
     std::vector<uint32_t> order(frontier.size());
     std::iota(order.begin(), order.end(), 0u);
-    const auto criterion = [&](uint32_t i) -> const NestedCriterion& {
-        return frontier[i];
-    };
+    const auto criterion = [&](uint32_t i) -> const NestedCriterion& { return frontier[i]; };
     const auto join = [&](std::span<uint32_t> some) {
         NestedCriterion c = criterion(some[0]);
         for (const uint32_t i : some) c = c.joined(criterion(i));

@@ -24,8 +24,7 @@ struct BuildCounts {
 };
 
 /// Told of each node once, after its children. One thread.
-using SplitSink =
-    std::function<void(NodeIndex, const SplitRow&, const SplitGrid&, SplitNode&)>;
+using SplitSink = std::function<void(NodeIndex, const SplitRow&, const SplitGrid&, SplitNode&)>;
 
 /// Without rows and nodes: these go to the sink. There is one at least.
 SplitForest encodeSplits(const Collapses& collapses, const Lattice& lattice, TempSpace& space,

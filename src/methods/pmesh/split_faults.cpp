@@ -49,7 +49,8 @@ private:
         if (c.error == 0 || c.error >= NestedCriterion::kEver) return "its error is no number";
         if (c.scale > LocalCriterion::kMostScale) return "its box is none of this grid";
         if (c.error > row_.criterion.error) return "its error exceeds its node's";
-        if (uint64_t(split.leaves[0]) + split.leaves[1] >= 1u << 31) return "it has too many leaves";
+        if (uint64_t(split.leaves[0]) + split.leaves[1] >= 1u << 31)
+            return "it has too many leaves";
         for (const uint32_t side : {0u, 1u}) {
             if ((split.brings >> side & 1) == 0) continue;
             const VertexSplit::Corners& corner = split.corner[side];
@@ -128,9 +129,9 @@ Node tableNode(NodeIndex index, const SplitRow& row, const SplitNode& node, cons
     // Enough that rounding back comes to no less.
     double radius = 0.5 * unit * glm::length(high - low) * (1 + 1e-6) + 0.01 * unit + 2;
     for (const Sphere& s : below)
-        radius = std::max(radius, (glm::distance(Vec3d(s.centre), Vec3d(centre)) +
-                                   double(s.radius)) *
-                                      (1 + 1e-6));
+        radius =
+            std::max(radius, (glm::distance(Vec3d(s.centre), Vec3d(centre)) + double(s.radius)) *
+                                 (1 + 1e-6));
     n.saturated = n.bounds = {centre, float(radius)};
     n.error = float(double(NestedCriterion::errorOf(row.criterion.error)) * unit);
     n.child[0] = row.child[0];

@@ -17,8 +17,8 @@ namespace pietra::pmesh {
 [[nodiscard]] std::string faultBetween(const SplitRow& parent_row, const SplitNode& parent,
                                        NodeIndex child, const SplitNode& node);
 
-/// As a file's table of nodes has it: Node::vertices counts splits, Node::triangles what they bring.
-/// `below`: the spheres of its children, which its own encloses.
+/// As a file's table of nodes has it: Node::vertices counts splits, Node::triangles what they
+/// bring. `below`: the spheres of its children, which its own encloses.
 Node tableNode(NodeIndex index, const SplitRow& row, const SplitNode& node, const Lattice& lattice,
                const SplitGrid& grid, std::span<const Sphere> below);
 /// And back: criteria that enclose those. Indices must be good.

@@ -20,8 +20,8 @@ constexpr size_t kTogether = 64;  ///< nodes read at a time
 /// What a node has to know from above of each split of its frontier.
 struct FromAbove {
     Leaf first;
-    Vec3i position;  ///< of the unsplit vertex
-    bool is_live;    ///< which is there, if all above are applied
+    Vec3i position;          ///< of the unsplit vertex
+    bool is_live;            ///< which is there, if all above are applied
     NestedCriterion within;  ///< of the split above
 };
 
@@ -158,8 +158,7 @@ void Model::walk(Budget& budget, IsApplied&& is_applied, Visit&& visit) const {
                     if (any_live[side]) {
                         references += below[side].size();
                         next.push_back(row.child[side]);
-                        waiting[row.child[side]] = {std::move(below[side]),
-                                                    node.child_parts[side]};
+                        waiting[row.child[side]] = {std::move(below[side]), node.child_parts[side]};
                     }
                 constexpr size_t kMore = 1 << 12;
                 for (; references > reserved; reserved += kMore)
@@ -193,8 +192,7 @@ std::string Model::modelFault(Budget& budget) {
             const VertexSplit& split = node.split[s];
             ++splits;
             for (const size_t side : {0u, 1u}) {
-                const int64_t w =
-                    int64_t(from.first) + split.leaves[0] + split.corner[side].w;
+                const int64_t w = int64_t(from.first) + split.leaves[0] + split.corner[side].w;
                 if ((split.brings >> side & 1) && (w < 0 || w >= int64_t(leaves_)))
                     fault = "a triangle has a corner that is no leaf";
             }
@@ -263,12 +261,12 @@ MeshCut Model::cut(const CutRequest& request, Budget& budget) {
     size_t triangles = forest_.base.triangle.size();
     using Parts = std::span<const NestedCriterion>;
     walk(budget, needs,
-        [&](const SplitNode& node, uint32_t s, const FromAbove& from, bool applied, Parts) {
-            if (!applied) return;
-            const VertexSplit& split = node.split[s];
-            active.add(from.first + split.leaves[0]);
-            triangles += (split.brings & 1u) + (split.brings >> 1 & 1u);
-        });
+         [&](const SplitNode& node, uint32_t s, const FromAbove& from, bool applied, Parts) {
+             if (!applied) return;
+             const VertexSplit& split = node.split[s];
+             active.add(from.first + split.leaves[0]);
+             triangles += (split.brings & 1u) + (split.brings >> 1 & 1u);
+         });
     const size_t vertices = leaves_ > 0 ? active.count() : 0;
     const WordLayout layout = forest_.layout;
     const Reservation for_mesh = budget.reserve(
@@ -298,8 +296,7 @@ MeshCut Model::cut(const CutRequest& request, Budget& budget) {
         first += root.leaves;
     }
     for (const auto& t : forest_.base.triangle)
-        mesh.triangle.push_back(
-            {active.placeOf(t[0]), active.placeOf(t[1]), active.placeOf(t[2])});
+        mesh.triangle.push_back({active.placeOf(t[0]), active.placeOf(t[1]), active.placeOf(t[2])});
     // Parents first: of what is put in one place the last one stays.
     walk(
         budget,
@@ -325,10 +322,8 @@ MeshCut Model::cut(const CutRequest& request, Budget& budget) {
                 if (w >= leaves_)
                     throw InputError(reader_.path(), "",
                                      "the model is damaged: a corner is no leaf");
-                const uint32_t v = active.placeOf(from.first + c.v),
-                               u = active.placeOf(name + c.u);
-                mesh.triangle.push_back({side == 0 ? v : u, side == 0 ? u : v,
-                                         active.placeOf(w)});
+                const uint32_t v = active.placeOf(from.first + c.v), u = active.placeOf(name + c.u);
+                mesh.triangle.push_back({side == 0 ? v : u, side == 0 ? u : v, active.placeOf(w)});
             }
         });
     mesh.edge_class.assign(mesh.triangleCount(), 0);

@@ -100,8 +100,8 @@ struct SplitGrid {
 };
 
 /// What a split states. Its box reaches, in multiples of 2^scale units, so far from the unsplit
-/// vertex's cell of that size; a larger box has no smaller scale, so boxes that are rounded outwards
-/// to such cells are nested as they were before.
+/// vertex's cell of that size; a larger box has no smaller scale, so boxes that are rounded
+/// outwards to such cells are nested as they were before.
 struct LocalCriterion {
     std::array<uint8_t, 3> below{}, above{};
     uint8_t scale = 0;
@@ -209,8 +209,8 @@ constexpr uint32_t slotOfSplit(SplitId id) {
 struct SplitNode {
     std::vector<VertexSplit> split;  ///< at most kSplitSlots
     uint32_t frontier = 0;           ///< how many, the first ones, are referred to from above
-    /// Of each child node: what the splits of its frontier state, in parts of them; each is enclosed
-    /// by one.
+    /// Of each child node: what the splits of its frontier state, in parts of them; each is
+    /// enclosed by one.
     std::array<std::vector<NestedCriterion>, 2> child_parts;
     WordLayout layout;
     std::vector<uint32_t> word;  ///< for each split those of v, then of u, after it
@@ -222,7 +222,7 @@ struct SplitRow {
     NodeIndex parent = kNoNode;
     std::array<NodeIndex, 2> child{kNoNode, kNoNode};
     uint32_t splits = 0;
-    uint16_t level = 0;  ///< in the tree of nodes: 0 for roots
+    uint16_t level = 0;         ///< in the tree of nodes: 0 for roots
     NestedCriterion criterion;  ///< encloses those of all splits in it and below
     bool operator==(const SplitRow&) const = default;
 };

@@ -58,7 +58,8 @@ TEST_P(EachForest, TheTableEnclosesItsNodes) {
     const SplitForest forest = forestOf(GetParam().make());
     std::vector<Node> table;
     for (NodeIndex n = 0; n < forest.node.size(); ++n)
-        table.push_back(tableNode(n, forest.row[n], forest.node[n], forest.lattice, forest.grid, {}));
+        table.push_back(
+            tableNode(n, forest.row[n], forest.node[n], forest.lattice, forest.grid, {}));
     std::vector<SplitRow> rows = rowsOf(table);
     setCriteria(table, forest.lattice, forest.grid, rows);
     for (NodeIndex n = 0; n < rows.size(); ++n) {
@@ -193,8 +194,8 @@ TEST(SplitView, IsMonotone) {
             NestedCriterion outer = inner.joined(randomCriterion(random));
             if (j % 2 == 0) {
                 outer = inner;
-                outer.min[random() % 3] -= uint16_t(inner.min[0] > 9 && inner.min[1] > 9 &&
-                                                    inner.min[2] > 9);
+                outer.min[random() % 3] -=
+                    uint16_t(inner.min[0] > 9 && inner.min[1] > 9 && inner.min[2] > 9);
                 outer.max[random() % 3] += uint16_t(random() % 3);
             }
             ASSERT_TRUE(outer.encloses(inner));

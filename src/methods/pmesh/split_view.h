@@ -34,8 +34,7 @@ struct SplitView {
     bool shows(const NestedCriterion& c, float from) const {
         float squared = 0, inside = 0;
         for (size_t k = 0; k < 3; ++k) {
-            const float d =
-                std::max({float(c.min[k]) - eye[k], eye[k] - float(c.max[k]), 0.0f});
+            const float d = std::max({float(c.min[k]) - eye[k], eye[k] - float(c.max[k]), 0.0f});
             squared += d * d;
         }
         for (size_t i = 0; i < side.size(); ++i) {
@@ -62,8 +61,7 @@ struct SplitView {
     double pixelsOf(const NestedCriterion& c) const {
         double squared = 0;
         for (size_t k = 0; k < 3; ++k) {
-            const double d =
-                std::max({double(c.min[k]) - eye[k], double(eye[k]) - c.max[k], 0.0});
+            const double d = std::max({double(c.min[k]) - eye[k], double(eye[k]) - c.max[k], 0.0});
             squared += d * d;
         }
         for (size_t i = 0; i < side.size(); ++i) {

@@ -38,7 +38,7 @@ private:
     TempSpace& space_;
     std::unique_ptr<Shared> shared_;
     std::vector<NumberLeaf> batch_;
-    Spill leaves_;  // of numbers, in any order
+    Spill leaves_;   // of numbers, in any order
     Spill corners_;  // one a record
     CachedRecords<std::array<Leaf, 2>> found_;
 };

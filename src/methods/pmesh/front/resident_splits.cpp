@@ -44,8 +44,8 @@ ResidentSplits::ResidentSplits(SplitForest forest, uint32_t most)
         loaded_.push_back(n);
         root_criterion_.resize(splitId(n + 1, 0));
         for (uint32_t s = 0; s < forest_.node[n].frontier; ++s)
-            root_criterion_[splitId(n, s)] = forest_.node[n].split[s].criterion.at(
-                before[n][s].position, forest_.grid);
+            root_criterion_[splitId(n, s)] =
+                forest_.node[n].split[s].criterion.at(before[n][s].position, forest_.grid);
     }
     forest_.node = {};
 }
@@ -153,8 +153,8 @@ bool ResidentSplits::isBlocked(const NestedCriterion& c) const {
     for (size_t i = 0; i < count; ++i) {
         uint16_t within = uint16_t(blocking_.error[i] >= c.error);
         for (size_t k = 0; k < 3; ++k)
-            within &= uint16_t((blocking_.min[k][i] <= c.min[k]) &
-                               (blocking_.max[k][i] >= c.max[k]));
+            within &=
+                uint16_t((blocking_.min[k][i] <= c.min[k]) & (blocking_.max[k][i] >= c.max[k]));
         found |= within;
     }
     return found != 0;

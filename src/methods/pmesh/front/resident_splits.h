@@ -10,8 +10,9 @@
 //     states, which encloses all that is in it and below. Asked for is what is wanted and not
 //     there, while its parent is. Longest asked for comes first.
 //   - While some are missing, a split may depend on what nobody can know: it is blocked if its
-//     criterion lies within such a part of a missing node. What is not blocked depends on nothing that is
-//     missing or blocked, as criteria nest along dependencies. What was applied before may stay.
+//     criterion lies within such a part of a missing node. What is not blocked depends on nothing
+//     that is missing or blocked, as criteria nest along dependencies. What was applied before may
+//     stay.
 //   - What is wanted is in use and stays; undoing a split needs no node.
 //   - No node arrives beyond `most`. Where more are required(), in use or asked for, than that,
 //     whoever calls has to make do with less.
@@ -34,11 +35,11 @@ namespace pietra::pmesh {
 /// All of a split that adaption needs.
 struct ResidentSplit {
     Leaf name;
-    std::array<SplitId, 2> child;             ///< the next splits of v and u, or kNoSplit
-    std::array<Leaf, 6> corner;               ///< of the triangles it brings; three equal: none
-    std::array<SplitVertex, 2> vertex;        ///< v and u after it
+    std::array<SplitId, 2> child;              ///< the next splits of v and u, or kNoSplit
+    std::array<Leaf, 6> corner;                ///< of the triangles it brings; three equal: none
+    std::array<SplitVertex, 2> vertex;         ///< v and u after it
     std::array<NestedCriterion, 2> criterion;  ///< of the children, or of the row of their node
-    bool closed;                              ///< its triangles' component is
+    bool closed;                               ///< its triangles' component is
 };
 
 class ResidentSplits {
@@ -82,7 +83,7 @@ public:
     /// A node without faults by itself. Nothing, and nothing done, where it has no room or its
     /// parent has left; isGivenUp() where it does not fit that.
     [[nodiscard]] std::optional<std::vector<Arrived>> arrive(NodeIndex index,
-                                                            const SplitNode& node);
+                                                             const SplitNode& node);
     /// It is damaged.
     void giveUp(NodeIndex index) { state_[index].is_bad = true; }
     bool isGivenUp(NodeIndex index) const { return state_[index].is_bad; }

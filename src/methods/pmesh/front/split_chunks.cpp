@@ -98,9 +98,9 @@ SplitChunks::SplitChunks(const ResidentSplits& nodes, const SplitFront& front)
         first += root.leaves;
     }
     const auto rootOf = [&](size_t t) {
-        return size_t(std::upper_bound(root_first_.begin(), root_first_.end(),
-                                       base.triangle[t][0]) -
-                      root_first_.begin()) -
+        return size_t(
+                   std::upper_bound(root_first_.begin(), root_first_.end(), base.triangle[t][0]) -
+                   root_first_.begin()) -
                1;
     };
     base_begin_.assign(root_first_.size() + 1, 0);

@@ -26,7 +26,7 @@ public:
 
 private:
     struct Made {
-        uint64_t version = 0;            ///< of the front
+        uint64_t version = 0;             ///< of the front
         std::vector<uint32_t> on_others;  ///< blocks, sorted: what changes there may show here
     };
     bool isStale(uint32_t block) const;

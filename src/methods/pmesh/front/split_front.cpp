@@ -21,8 +21,7 @@ void forBits(uint32_t bits, Body&& body) {
 }
 
 void prefetchLines(const void* from, size_t bytes) {
-    for (size_t i = 0; i < bytes; i += 64)
-        __builtin_prefetch(static_cast<const char*>(from) + i);
+    for (size_t i = 0; i < bytes; i += 64) __builtin_prefetch(static_cast<const char*>(from) + i);
 }
 
 int32_t trianglesOf(const std::array<Leaf, 6>& leaf) {
@@ -234,10 +233,13 @@ void SplitFront::merge(uint32_t block, Deferred& deferred) {
                 const Slot slot = slotAt(v);
                 if (slot.page.alive >> slot.i & 1) break;
             }
-            const Merge m{v, page.made[i], page.parent[i], page.birth.get(i), page.merged[i],
-                          words_a_vertex_
-                              ? wordsOf(b, p * kPageVertices + i) + words_a_vertex_
-                              : nullptr};
+            const Merge m{
+                v,
+                page.made[i],
+                page.parent[i],
+                page.birth.get(i),
+                page.merged[i],
+                words_a_vertex_ ? wordsOf(b, p * kPageVertices + i) + words_a_vertex_ : nullptr};
             if (v.block == block)
                 applyMerge(m);
             else
@@ -332,9 +334,8 @@ void SplitFront::prefetch(const Block& b, uint32_t slot) const {
 
 void SplitFront::fillQueue(Block& b) {
     for (uint32_t p = 0; p < b.page.size(); ++p)
-        forBits(std::exchange(pageAt(b, p * kPageVertices).opened, 0), [&](uint32_t i) {
-            b.queue.push_back(uint16_t(p * kPageVertices + i));
-        });
+        forBits(std::exchange(pageAt(b, p * kPageVertices).opened, 0),
+                [&](uint32_t i) { b.queue.push_back(uint16_t(p * kPageVertices + i)); });
 }
 
 void SplitFront::splitAll(uint32_t block, const SplitView& view, Deferred& deferred) {
@@ -563,7 +564,8 @@ void SplitFront::cutBlock(uint32_t block) {
     size_t begin = 0;
     for (size_t part = 0; part < parts; ++part) {
         size_t end = part + 1 == parts ? old.order.size() : old.order.size() * (part + 1) / parts;
-        while (end < old.order.size() && end > begin && old.leaf[end] / 64 == old.leaf[end - 1] / 64)
+        while (end < old.order.size() && end > begin &&
+               old.leaf[end] / 64 == old.leaf[end - 1] / 64)
             ++end;
         if (end <= begin) continue;
         if (begin > 0) {
@@ -624,8 +626,8 @@ void SplitFront::commit() {
     });
     const auto sizeOf = [&](uint32_t b) { return block_[b].order.size(); };
     for (uint32_t b = 0; b != kNone; b = block_[b].next)
-        while (block_[b].next != kNone && (sizeOf(block_[b].next) == 0 ||
-                                           sizeOf(b) + sizeOf(block_[b].next) < kFewInBlock))
+        while (block_[b].next != kNone &&
+               (sizeOf(block_[b].next) == 0 || sizeOf(b) + sizeOf(block_[b].next) < kFewInBlock))
             joinNext(b);
     for (uint32_t b = 0, next = 0; b != kNone; b = next) {
         next = block_[b].next;
@@ -641,8 +643,7 @@ void SplitFront::commit() {
     vertices_ = 0;
     size_t pages = 0;
     for (const Block& b : block_) vertices_ += b.order.size(), pages += b.page.size();
-    if (free_pages_.size() > pages / 4 + 2 * kSlabPages)
-        giveBack();
+    if (free_pages_.size() > pages / 4 + 2 * kSlabPages) giveBack();
 }
 
 void SplitFront::giveBack() {

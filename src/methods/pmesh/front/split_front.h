@@ -49,7 +49,8 @@ public:
 
     /// `nodes` must have looked at this view.
     SplitCounts adapt(const SplitView& view, const SplitLimits& limits = {});
-    /// How many vertices adapt() would begin with to split or to merge: 0 if there is nothing to do.
+    /// How many vertices adapt() would begin with to split or to merge: 0 if there is nothing to
+    /// do.
     size_t toDo(const SplitView& view) const;
     /// What these vertices wait for has arrived.
     void arrived(std::span<const ResidentSplits::Arrived> arrived);
@@ -148,9 +149,9 @@ private:
     }
     uint32_t* wordsOf(const Block& b, uint32_t slot) const {
         const uint32_t place = b.page[slot / kPageVertices];
-        return &words_[place / kSlabPages][(size_t(place % kSlabPages) * kPageVertices +
-                                            slot % kPageVertices) *
-                                           2 * words_a_vertex_];
+        return &words_[place / kSlabPages]
+                      [(size_t(place % kSlabPages) * kPageVertices + slot % kPageVertices) * 2 *
+                       words_a_vertex_];
     }
     uint32_t takePage();
     void addPage(Block& b);

@@ -23,9 +23,8 @@ struct ForestMesh {
 std::vector<ForestMesh> meshes() {
     std::vector<TestMesh> all = testMeshes();
     all.push_back({"sheet", [] { return onLattice(test::gridShape(90, 0.1), 5000); }});
-    all.push_back({"large_ball", [] {
-                       return onLattice(dented(test::sphereShape(64), 0.01), 1 << 20);
-                   }});
+    all.push_back(
+        {"large_ball", [] { return onLattice(dented(test::sphereShape(64), 0.01), 1 << 20); }});
     std::vector<ForestMesh> both;
     for (const TestMesh& mesh : all)
         for (const uint32_t leaf_triangles : {0u, 100u}) both.push_back({mesh, leaf_triangles});
@@ -267,7 +266,8 @@ TEST_P(EachForest, WhateverIsThereEveryFrameIsOneMesh) {
             std::vector<NodeIndex> asked = nodes.requests(1 + random() % 4);
             std::shuffle(asked.begin(), asked.end(), random);
             for (const NodeIndex n : asked)
-                if (const auto arrived = nodes.arrive(n, made.forest.node[n])) front.arrived(*arrived);
+                if (const auto arrived = nodes.arrive(n, made.forest.node[n]))
+                    front.arrived(*arrived);
             EXPECT_LE(nodes.loaded(), std::max<size_t>(most, 1));
             if (random() % 8 == 0) nodes.evictOldest();
         }

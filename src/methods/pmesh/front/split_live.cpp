@@ -60,8 +60,7 @@ private:
     }
     SplitView viewOf(const View& view, double pixels) const {
         if (pixels <= 0) return wholeSplitView(true);
-        return splitView(view, nodes_.forest().lattice, nodes_.forest().grid, pixels,
-                         info_.bounds);
+        return splitView(view, nodes_.forest().lattice, nodes_.forest().grid, pixels, info_.bounds);
     }
     size_t meshBytes() const { return base_bytes_ + front_.bytes() + chunks_.bytes(); }
     size_t bytesOfVertex() const {
@@ -80,7 +79,7 @@ private:
     ResidentSplits nodes_;
     SplitFront front_;
     SplitChunks chunks_;
-    double chunks_ms_ = 0;        // of the last frame
+    double chunks_ms_ = 0;       // of the last frame
     double splits_a_ms_ = 1000;  // about
     LiveFrame frame_;
     std::vector<std::string> faults_;
@@ -118,8 +117,8 @@ size_t LiveSplits::drawable(uint64_t triangles) const {
 const LiveFrame& LiveSplits::adapt(const LiveTask& task) {
     SplitView view = viewOf(*task.view, task.pixels);
     if (task.seen != nullptr && task.pixels > 0)
-        view.occlusion = std::make_shared<Occlusion>(*task.seen, nodes_.forest().lattice,
-                                                     nodes_.forest().grid);
+        view.occlusion =
+            std::make_shared<Occlusion>(*task.seen, nodes_.forest().lattice, nodes_.forest().grid);
     nodes_.look(view);
     if (task.only_look) {
         SplitCounts counts;
@@ -189,8 +188,7 @@ std::unique_ptr<LiveModel> openLive(const ModelReader& reader) {
     SplitForest forest = openForest(reader);
     forest.node.resize(forest.row.size());
     for (NodeIndex n = 0; n < forest.row.size() && forest.row[n].parent == kNoNode; ++n)
-        if (const std::string fault = readNode(reader, forest, n, forest.node[n]);
-            !fault.empty())
+        if (const std::string fault = readNode(reader, forest, n, forest.node[n]); !fault.empty())
             throw InputError::atByte(reader.path(), reader.page(n).offset, fault);
     return liveOf(std::move(forest), reader.info());
 }

@@ -48,8 +48,8 @@ HWY_INLINE uint32_t shows(const SplitView& view, const CriterionPage& c, size_t 
     }
     const hn::Rebind<uint16_t, F> words;
     const hn::Rebind<uint32_t, F> u;
-    const VF error = hn::BitCast(
-        f, hn::ShiftLeft<16>(hn::PromoteTo(u, hn::Load(words, &c.error[at]))));
+    const VF error =
+        hn::BitCast(f, hn::ShiftLeft<16>(hn::PromoteTo(u, hn::Load(words, &c.error[at]))));
     const VF outside = hn::Mul(inside, hn::Set(f, SplitView::kOutside));
     const auto at_reach = [&](float reach) {
         const VF rest = hn::Add(hn::Mul(error, hn::Set(f, reach)), outside);

@@ -39,12 +39,12 @@ struct alignas(4096) SplitPage {
     std::array<Leaf, kPageVertices> last;      ///< the name of the split above, or kNoLeaf
     std::array<Leaf, kPageVertices> parent;    ///< of the one above that which it came with
     std::array<SplitVertex, kPageVertices> vertex;
-    std::array<SplitVertex, kPageVertices> merged;  ///< what undoing that makes of v
+    std::array<SplitVertex, kPageVertices> merged;        ///< what undoing that makes of v
     std::array<std::array<Leaf, 6>, kPageVertices> leaf;  ///< of the triangles it came with
-    uint32_t alive;    ///< a bit a slot
-    uint32_t dropped;  ///< in this frame, and not yet merged
-    uint32_t opened;   ///< to be split
-    uint32_t closed;   ///< their triangles are of a closed component
+    uint32_t alive;                                       ///< a bit a slot
+    uint32_t dropped;                                     ///< in this frame, and not yet merged
+    uint32_t opened;                                      ///< to be split
+    uint32_t closed;  ///< their triangles are of a closed component
 };
 static_assert(sizeof(SplitPage) == 4096);
 
