@@ -13,6 +13,7 @@
 #include "base/parallel.h"
 #include "clock.h"
 #include "methods/pmesh/front/split_chunks.h"
+#include "methods/pmesh/front/split_front.h"
 #include "methods/pmesh/in_core_builder.h"
 #include "methods/pmesh/split_codec.h"
 #include "methods/pmesh/whole_mesh.h"
@@ -122,7 +123,7 @@ private:
     std::vector<SplitNode> node_;
     ResidentSplits nodes_;
     SplitFront front_{nodes_};
-    SplitChunks chunks_{nodes_, front_};
+    SplitChunks chunks_{nodes_, front_.blocks()};
 };
 
 void run(const char* path) {

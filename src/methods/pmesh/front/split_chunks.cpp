@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/parallel.h"
 #include "geometry/bounds.h"
 #include "geometry/lattice.h"
 
@@ -89,8 +90,8 @@ void sortUnique(std::vector<uint32_t>& v) {
 
 }  // namespace
 
-SplitChunks::SplitChunks(const ResidentSplits& nodes, const SplitFront& front)
-    : nodes_(nodes), front_(front) {
+SplitChunks::SplitChunks(const ResidentSplits& nodes, const SplitBlocks& blocks)
+    : nodes_(nodes), blocks_(blocks) {
     const SplitBase& base = nodes.forest().base;
     Leaf first = 0;
     for (const SplitBase::Root& root : base.root) {
@@ -125,13 +126,13 @@ void SplitChunks::addBaseTriangles(Leaf root, std::vector<std::array<Leaf, 3>>& 
 
 bool SplitChunks::isStale(uint32_t block) const {
     const Made& made = made_[block];
-    if (front_.version(block) > made.version) return true;
+    if (blocks_.all()[block].version > made.version) return true;
     return std::any_of(made.on_others.begin(), made.on_others.end(),
-                       [&](uint32_t other) { return front_.version(other) > made.version; });
+                       [&](uint32_t other) { return blocks_.all()[other].version > made.version; });
 }
 
 void SplitChunks::update() {
-    chunk_.resize(front_.blockCount());
+    chunk_.resize(blocks_.all().size());
     made_.resize(chunk_.size());
     std::vector<uint32_t> stale;
     for (uint32_t b = 0; b < chunk_.size(); ++b)
@@ -144,18 +145,18 @@ void SplitChunks::update() {
 void SplitChunks::make(uint32_t block) {
     thread_local Numbers number;
     thread_local std::vector<std::array<Leaf, 3>> corners;
-    thread_local std::vector<SplitFront::Place> used;
+    thread_local std::vector<SplitBlocks::Place> used;
     LiveChunk& chunk = chunk_[block];
     Made& made = made_[block];
-    made.version = front_.latestVersion();
+    made.version = blocks_.latestVersion();
     made.on_others.clear();
-    const auto own = uint32_t(front_.countOf(block));
+    const auto own = uint32_t(blocks_.countOf(block));
     corners.clear();
     used.clear();
     bool closed = true;
     for (uint32_t r = 0; r < own; ++r) {
         used.push_back({block, r});
-        const SplitFront::Slot slot = front_.slotAt({block, r});
+        const SplitBlocks::Slot slot = blocks_.at({block, r});
         const std::array<Leaf, 6>& leaf = slot.page.leaf[slot.i];
         const size_t before = corners.size();
         if (leaf[0] != leaf[1]) corners.push_back({leaf[0], leaf[1], leaf[2]});
@@ -168,12 +169,12 @@ void SplitChunks::make(uint32_t block) {
     number.begin(3 * corners.size());
     for (size_t t = 0; t < corners.size(); ++t)
         for (size_t k = 0; k < 3; ++k) {
-            const SplitFront::Place p = front_.ownerOf(corners[t][k]);
+            const SplitBlocks::Place p = blocks_.ownerOf(corners[t][k]);
             if (p.block == block) {
                 chunk.mesh.triangle[t][k] = p.rank;
                 continue;
             }
-            uint32_t& n = number[front_.keyOf(p)];
+            uint32_t& n = number[blocks_.keyOf(p)];
             if (n == kNone) {
                 n = uint32_t(used.size());
                 used.push_back(p);
@@ -181,7 +182,7 @@ void SplitChunks::make(uint32_t block) {
             }
             chunk.mesh.triangle[t][k] = n;
             // A vertex that comes before the leaf, and after the one that has it now.
-            made.on_others.push_back(front_.blockOf(corners[t][k]));
+            made.on_others.push_back(blocks_.blockOf(corners[t][k]));
         }
     // What hangs below a vertex of a block before is one's own affair, but for its place.
     sortUnique(made.on_others);
@@ -198,7 +199,8 @@ void SplitChunks::make(uint32_t block) {
     std::array<uint16_t, 3> min{0xffff, 0xffff, 0xffff}, max{};
     uint16_t error = 0;
     for (size_t i = 0; i < used.size(); ++i) {
-        const auto [page, s, words] = front_.slotAt(used[i]);
+        const auto [page, s] = blocks_.at(used[i]);
+        const uint32_t* const words = blocks_.wordsOf(used[i]);
         chunk.mesh.position[i] = drawnPosition(page.vertex[s], lattice.shift);
         chunk.mesh.normal[i] = unpackNormal(page.vertex[s].normal);
         if (words) setVertex({words, layout.words()}, layout, chunk.mesh, i);

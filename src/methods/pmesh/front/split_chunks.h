@@ -7,7 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "methods/pmesh/front/split_front.h"
+#include "methods/pmesh/front/resident_splits.h"
+#include "methods/pmesh/front/split_blocks.h"
 #include "multires/live_model.h"
 
 namespace pietra::pmesh {
@@ -15,7 +16,7 @@ namespace pietra::pmesh {
 class SplitChunks {
 public:
     /// Both must outlive this.
-    SplitChunks(const ResidentSplits& nodes, const SplitFront& front);
+    SplitChunks(const ResidentSplits& nodes, const SplitBlocks& blocks);
 
     /// After each frame.
     void update();
@@ -26,7 +27,7 @@ public:
 
 private:
     struct Made {
-        uint64_t version = 0;             ///< of the front
+        uint64_t version = 0;             ///< of the blocks
         std::vector<uint32_t> on_others;  ///< blocks, sorted: what changes there may show here
     };
     bool isStale(uint32_t block) const;
@@ -34,7 +35,7 @@ private:
     void addBaseTriangles(Leaf root, std::vector<std::array<Leaf, 3>>& corners, bool& closed) const;
 
     const ResidentSplits& nodes_;
-    const SplitFront& front_;
+    const SplitBlocks& blocks_;
     std::vector<Leaf> root_first_;
     std::vector<uint32_t> base_order_, base_begin_;  ///< base triangles by the root of a corner
     std::vector<LiveChunk> chunk_;                   ///< by block

@@ -123,15 +123,15 @@ struct Named {
 
 Named namedOf(const SplitFront& front, const SplitForest& forest) {
     Named named;
-    const auto name = [&](Leaf leaf) { return front.firstLeaf(front.ownerOf(leaf)); };
-    for (uint32_t b = 0; b < front.blockCount(); ++b) {
+    const auto name = [&](Leaf leaf) { return front.blocks().firstLeaf(front.blocks().ownerOf(leaf)); };
+    for (uint32_t b = 0; b < front.blocks().all().size(); ++b) {
         Leaf last = 0;
-        for (uint32_t r = 0; r < front.countOf(b); ++r) {
-            const Leaf first = front.firstLeaf({b, r});
-            EXPECT_EQ(front.ownerOf(first), (SplitFront::Place{b, r}));
+        for (uint32_t r = 0; r < front.blocks().countOf(b); ++r) {
+            const Leaf first = front.blocks().firstLeaf({b, r});
+            EXPECT_EQ(front.blocks().ownerOf(first), (SplitBlocks::Place{b, r}));
             EXPECT_TRUE(r == 0 || first > last);
             last = first;
-            const SplitFront::Slot slot = front.slotAt({b, r});
+            const SplitBlocks::Slot slot = front.blocks().at({b, r});
             EXPECT_EQ(slot.page.first[slot.i], first);
             EXPECT_TRUE(named.vertex.emplace(first, slot.page.vertex[slot.i]).second);
             const auto& leaf = slot.page.leaf[slot.i];
@@ -184,8 +184,8 @@ std::vector<bool> neededBy(const Made& made, const SplitView& view) {
 std::vector<bool> appliedIn(const Made& made, const SplitFront& front) {
     std::vector<bool> applied;
     for (const Leaf name : made.name) {
-        const SplitFront::Place p = front.ownerOf(name);
-        applied.push_back(front.firstLeaf(p) == name);
+        const SplitBlocks::Place p = front.blocks().ownerOf(name);
+        applied.push_back(front.blocks().firstLeaf(p) == name);
     }
     return applied;
 }
@@ -288,9 +288,9 @@ TEST(SplitFront, TheNumberOfThreadsDoesNotShow) {
             const SplitView view = randomView(random, made.forest);
             nodes.look(view);
             front.adapt(view);
-            for (uint32_t b = 0; b < front.blockCount(); ++b)
-                for (uint32_t r = 0; r < front.countOf(b); ++r) {
-                    const SplitFront::Slot slot = front.slotAt({b, r});
+            for (uint32_t b = 0; b < front.blocks().all().size(); ++b)
+                for (uint32_t r = 0; r < front.blocks().countOf(b); ++r) {
+                    const SplitBlocks::Slot slot = front.blocks().at({b, r});
                     const std::array<uint32_t, 3> some{b, slot.i, slot.page.first[slot.i]};
                     const auto all = std::as_bytes(std::span(some));
                     bytes.insert(bytes.end(), all.begin(), all.end());

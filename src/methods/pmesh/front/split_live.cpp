@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/stopwatch.h"
 #include "methods/pmesh/front/split_chunks.h"
+#include "methods/pmesh/front/split_front.h"
 #include "methods/pmesh/split_codec.h"
 #include "methods/pmesh/split_model.h"
 
@@ -31,7 +32,7 @@ public:
           base_bytes_(bytesOf(forest)),
           nodes_(std::move(forest), uint32_t(rows_.size())),
           front_(nodes_),
-          chunks_(nodes_, front_) {}
+          chunks_(nodes_, front_.blocks()) {}
 
     std::unique_ptr<LivePage> decode(uint32_t page, std::span<const std::byte> bytes,
                                      std::string& fault) const override {
@@ -66,7 +67,7 @@ private:
     size_t bytesOfVertex() const {
         // In pages, of the vertex and of what it is merged to; in chunks, of which some have it.
         const size_t words = 18 * nodes_.forest().layout.words();
-        return SplitFront::kVertexBytes + kChunkBytes + words;
+        return SplitBlocks::kVertexBytes + kChunkBytes + words;
     }
     size_t roomFor(size_t bytes);
     size_t drawable(uint64_t triangles) const;

@@ -44,6 +44,7 @@ struct alignas(4096) SplitPage {
     uint32_t alive;                                       ///< a bit a slot
     uint32_t dropped;                                     ///< in this frame, and not yet merged
     uint32_t opened;                                      ///< to be split
+    uint32_t grown;                                       ///< their next split is another one
     uint32_t closed;  ///< their triangles are of a closed component
 };
 static_assert(sizeof(SplitPage) == 4096);
