@@ -21,6 +21,7 @@ ResidentSplits::ResidentSplits(SplitForest forest, uint32_t most)
     : forest_(std::move(forest)),
       state_(forest_.row.size()),
       node_(forest_.row.size()),
+      split_(forest_.row.size()),
       most_(most),
       limit_(most) {
     std::vector<std::vector<Reference>> above;
@@ -38,10 +39,9 @@ ResidentSplits::ResidentSplits(SplitForest forest, uint32_t most)
     above.resize(std::max<size_t>(above.size(), 1));
     before.resize(above.size());
     for (NodeIndex n = 0; n < forest_.row.size() && forest_.row[n].parent == kNoNode; ++n) {
-        node_[n] = placed(n, forest_.node[n], above[n], before[n]);
-        CHECK(node_[n] != nullptr);
-        node_[n]->position = uint32_t(loaded_.size());
-        loaded_.push_back(n);
+        auto loaded = placed(n, forest_.node[n], above[n], before[n]);
+        CHECK(loaded != nullptr);
+        keep(n, std::move(loaded));
         root_criterion_.resize(splitId(n + 1, 0));
         for (uint32_t s = 0; s < forest_.node[n].frontier; ++s)
             root_criterion_[splitId(n, s)] =
@@ -57,7 +57,7 @@ std::unique_ptr<ResidentSplits::Loaded> ResidentSplits::placed(
     if (node.frontier != above.size()) return nullptr;
     auto loaded = std::make_unique<Loaded>();
     const size_t count = node.split.size();
-    loaded->split.resize(count);
+    loaded->split = std::make_unique<ResidentSplit[]>(count);
     loaded->word = node.word;
     loaded->child_parts = node.child_parts;
     const NestedCriterion row = forest_.row[index].criterion;
@@ -73,7 +73,6 @@ std::unique_ptr<ResidentSplits::Loaded> ResidentSplits::placed(
         const VertexSplit& split = node.split[s];
         ResidentSplit& to = loaded->split[s];
         to.name = first[s] + split.leaves[0];
-        to.closed = (split.brings & VertexSplit::kClosed) != 0;
         to.corner.fill(0);
         for (size_t t = 0; t < 2; ++t) {
             if ((split.brings >> t & 1) == 0) continue;
@@ -87,29 +86,34 @@ std::unique_ptr<ResidentSplits::Loaded> ResidentSplits::placed(
         for (uint16_t end = 0; end < 2; ++end) {
             // Wherever damage takes it, it is a number.
             for (int k = 0; k < 3; ++k)
-                to.vertex[end].position[k] =
+                to.position[end][k] =
                     int32_t(uint32_t(from[s].position[k]) + uint32_t(split.offset[end][k]));
-            to.vertex[end].normal = split.normal[end];
-            to.child[end] = kNoSplit;
+            to.normal[end] = split.normal[end];
+            to.child[end] = split.child[end];
             to.criterion[end] = {};
             if (split.child[end] == kNoChildSplit) continue;
             const uint32_t where = split.child[end] / kSplitSlots;
             const uint32_t slot = split.child[end] % kSplitSlots;
             if (where == 0) {
-                to.child[end] = splitId(index, slot);
-                to.criterion[end] =
-                    node.split[slot].criterion.at(to.vertex[end].position, forest_.grid);
+                to.criterion[end] = node.split[slot].criterion.at(to.position[end], forest_.grid);
                 first[slot] = end == 0 ? first[s] : to.name;
-                from[slot] = to.vertex[end];
+                from[slot] = to.vertex(end);
             } else {
-                to.child[end] = splitId(forest_.row[index].child[where - 1], slot);
                 to.criterion[end] = row;
                 loaded->reference[where - 1].push_back(
                     {end == 0 ? first[s] : to.name, split.leaves[end], uint16_t(s), end});
             }
         }
+        if ((split.brings & VertexSplit::kClosed) != 0) to.child[0] |= ResidentSplit::kClosed;
     }
     return loaded;
+}
+
+void ResidentSplits::keep(NodeIndex index, std::unique_ptr<Loaded> loaded) {
+    loaded->position = uint32_t(loaded_.size());
+    loaded_.push_back(index);
+    split_[index] = loaded->split.get();
+    node_[index] = std::move(loaded);
 }
 
 void ResidentSplits::look(const SplitView& view) {
@@ -203,7 +207,7 @@ std::optional<std::vector<ResidentSplits::Arrived>> ResidentSplits::arrive(NodeI
     const size_t side = forest_.row[parent].child[0] == index ? 0 : 1;
     std::vector<SplitVertex> before;
     for (const Reference& r : above.reference[side])
-        before.push_back(above.split[r.slot].vertex[r.end]);
+        before.push_back(above.split[r.slot].vertex(r.end));
     auto loaded = placed(index, node, above.reference[side], before);
     if (!loaded) return giveUp(index), std::nullopt;
     std::vector<Arrived> arrived;
@@ -214,9 +218,7 @@ std::optional<std::vector<ResidentSplits::Arrived>> ResidentSplits::arrive(NodeI
         above.split[r.slot].criterion[r.end] = criterion;
         arrived.push_back({r.first, splitId(index, s), criterion});
     }
-    loaded->position = uint32_t(loaded_.size());
-    loaded_.push_back(index);
-    node_[index] = std::move(loaded);
+    keep(index, std::move(loaded));
     ++state_[parent].loaded_children;
     state_[index].asked = 0;
     state_[index].last_used = frame_;
@@ -256,6 +258,7 @@ void ResidentSplits::evict(NodeIndex index) {
     node_[loaded_[position]]->position = position;
     loaded_.pop_back();
     node_[index].reset();
+    split_[index] = nullptr;
     --state_[forest_.row[index].parent].loaded_children;
 }
 

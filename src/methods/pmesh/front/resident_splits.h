@@ -32,15 +32,20 @@
 
 namespace pietra::pmesh {
 
-/// All of a split that adaption needs.
-struct ResidentSplit {
+/// All of a split that adaption needs, in a line and a half of a cache.
+struct alignas(32) ResidentSplit {
     Leaf name;
-    std::array<SplitId, 2> child;              ///< the next splits of v and u, or kNoSplit
-    std::array<Leaf, 6> corner;                ///< of the triangles it brings; three equal: none
-    std::array<SplitVertex, 2> vertex;         ///< v and u after it
-    std::array<NestedCriterion, 2> criterion;  ///< of the children, or of the row of their node
-    bool closed;                               ///< its triangles' component is
+    std::array<uint16_t, 2> child;  ///< as in VertexSplit, but that child[0] may have kClosed, too
+    std::array<Leaf, 6> corner;     ///< of the triangles it brings; three equal: none
+    std::array<Vec3i, 2> position;  ///< of v and u after it
+    std::array<uint16_t, 2> normal;
+    std::array<NestedCriterion, 2> criterion;     ///< of the children, or of the row of their node
+    static constexpr uint16_t kClosed = 1 << 15;  ///< its triangles' component is
+
+    SplitVertex vertex(size_t end) const { return {position[end], normal[end]}; }
+    bool closed() const { return (child[0] & kClosed) != 0; }
 };
+static_assert(sizeof(ResidentSplit) == 96);
 
 class ResidentSplits {
 public:
@@ -52,10 +57,19 @@ public:
 
     const SplitForest& forest() const { return forest_; }  ///< without its nodes
     uint32_t leaves() const { return leaves_; }
-    bool isLoaded(NodeIndex n) const { return node_[n] != nullptr; }
+    bool isLoaded(NodeIndex n) const { return split_[n] != nullptr; }
     /// Its node must be loaded.
-    const ResidentSplit& at(SplitId id) const {
-        return node_[nodeOfSplit(id)]->split[slotOfSplit(id)];
+    const ResidentSplit& at(SplitId id) const { return split_[nodeOfSplit(id)][slotOfSplit(id)]; }
+    /// The next splits of v and u after `split`, which is at(id), or kNoSplit.
+    std::array<SplitId, 2> childrenOf(SplitId id, const ResidentSplit& split) const {
+        const NodeIndex node = nodeOfSplit(id);
+        const auto of = [&](uint32_t code) {
+            if (code < kSplitSlots) return splitId(node, code);
+            if (code == kNoChildSplit) return kNoSplit;
+            const uint32_t side = code / kSplitSlots - 1;
+            return splitId(forest_.row[node].child[side], code % kSplitSlots);
+        };
+        return {of(split.child[0] & uint16_t(~ResidentSplit::kClosed)), of(split.child[1])};
     }
     /// Of a root's first split.
     const NestedCriterion& rootCriterion(SplitId id) const { return root_criterion_[id]; }
@@ -123,7 +137,7 @@ private:
         void add(const NestedCriterion& c);
     };
     struct Loaded {
-        std::vector<ResidentSplit> split;
+        std::unique_ptr<ResidentSplit[]> split;
         std::vector<uint32_t> word;
         std::array<std::vector<Reference>, 2> reference;
         std::array<std::vector<NestedCriterion>, 2> child_parts;
@@ -132,6 +146,7 @@ private:
     static constexpr uint32_t kFramesKept = 60;  ///< for what is only prefetched
 
     size_t wordsOfOne() const { return 2 * size_t(forest_.layout.words()); }
+    void keep(NodeIndex index, std::unique_ptr<Loaded> loaded);
     std::unique_ptr<Loaded> placed(NodeIndex index, const SplitNode& node,
                                    std::span<const Reference> above,
                                    std::span<const SplitVertex> before) const;
@@ -147,6 +162,7 @@ private:
     uint32_t leaves_ = 0;
     std::vector<State> state_;
     std::vector<std::unique_ptr<Loaded>> node_;
+    std::vector<const ResidentSplit*> split_;      ///< of each node; null: not loaded
     std::vector<NestedCriterion> root_criterion_;  ///< by id; root nodes come first
     std::vector<NodeIndex> loaded_;  ///< in the order of their arrival, but for gaps filled
     std::vector<NodeIndex> asked_;

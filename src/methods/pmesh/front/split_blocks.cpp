@@ -7,6 +7,7 @@
 #include "base/check.h"
 #include "base/give_back.h"
 #include "base/parallel.h"
+#include "methods/pmesh/front/split_index.h"
 
 namespace pietra::pmesh {
 
@@ -53,22 +54,25 @@ size_t SplitBlocks::bytes() const {
     size_t pages = free_pages_.size();
     for (const Block& b : block_) {
         pages += b.page.size();
-        bytes += b.page.capacity() * sizeof(uint32_t) +
-                 (b.order.capacity() + b.dropping.capacity() + b.opening.capacity() +
-                  b.grown.capacity()) *
-                     sizeof(uint16_t);
+        bytes +=
+            b.page.capacity() * sizeof(uint32_t) + (b.order.capacity() + b.dropping.capacity() +
+                                                    b.opening.capacity() + b.grown.capacity()) *
+                                                       sizeof(uint16_t);
     }
     const size_t words = kPageVertices * 2 * words_a_vertex_ * sizeof(uint32_t);
     return bytes + pages * (sizeof(SplitPage) + words);
 }
 
-void SplitBlocks::giveBack() {
-    for (const uint32_t page : free_pages_) {
-        SplitPage* const p = &pool_[page / kSlabPages][page % kSlabPages];
+/// So many, those that have been free for longest.
+void SplitBlocks::giveBack(size_t count) {
+    const auto end = free_pages_.begin() + ptrdiff_t(count);
+    for (auto page = free_pages_.begin(); page != end; ++page) {
+        SplitPage* const p = &pool_[*page / kSlabPages][*page % kSlabPages];
         pietra::giveBack(p, p + 1);
     }
-    clean_pages_.insert(clean_pages_.end(), free_pages_.begin(), free_pages_.end());
-    free_pages_.clear();
+    clean_pages_.insert(clean_pages_.end(), free_pages_.begin(), end);
+    free_pages_.erase(free_pages_.begin(), end);
+    least_free_ = free_pages_.size();
 }
 
 uint32_t SplitBlocks::add(Block& b, Leaf first) {
@@ -122,6 +126,12 @@ void SplitBlocks::pack(Block& b) {
 
 // ---- the index
 
+void SplitBlocks::ownersOf(std::span<const Leaf> leaf, std::span<uint32_t> key) const {
+    countUpTo(bits_.data(), index_.data(), leaf, key.data());
+    for (size_t i = 0; i < leaf.size(); ++i)
+        key[i] = (key[i] & kRankMask) > 0 ? key[i] - 1 : keyOf(ownerOf(leaf[i]));
+}
+
 void SplitBlocks::setBits(Block& b) {
     std::fill(bits_.begin() + b.word_begin, bits_.begin() + b.word_end, 0);
     for (uint32_t p = 0; p < b.page.size(); ++p) {
@@ -135,21 +145,14 @@ void SplitBlocks::setBits(Block& b) {
 /// Needs bits.
 void SplitBlocks::number(uint32_t block) {
     Block& b = block_[block];
-    uint32_t rank = 0;
-    for (uint32_t w = b.word_begin; w < b.word_end; ++w) {
-        index_[w] = block << kRankBits | rank;
-        rank += uint32_t(std::popcount(bits_[w]));
-    }
+    numberWords(&bits_[b.word_begin], b.word_end - b.word_begin, block << kRankBits,
+                &index_[b.word_begin]);
     if (b.order.capacity() > 2 * size_t(b.alive)) std::vector<uint16_t>().swap(b.order);
     b.order.resize(b.alive);
     for (uint32_t p = 0; p < b.page.size(); ++p) {
         const SplitPage& from = page(b, p);
-        forBits(from.alive, [&](uint32_t i) {
-            const Leaf leaf = from.first[i];
-            const uint64_t before = bits_[leaf / 64] & ((uint64_t(1) << leaf % 64) - 1);
-            b.order[(index_[leaf / 64] & kRankMask) + uint32_t(std::popcount(before))] =
-                uint16_t(p * kPageVertices + i);
-        });
+        orderSlots(bits_.data(), index_.data(), from.first.data(), from.alive, kRankMask,
+                   p * kPageVertices, b.order.data());
     }
     b.version = version_;
 }
@@ -241,10 +244,9 @@ void SplitBlocks::cut(const Cut& cut, const std::vector<uint32_t>& parts) {
         forBits(from.alive, [&](uint32_t i) {
             const uint32_t word = from.first[i] / 64;
             if (word < b.word_end) return;
-            const auto after =
-                std::upper_bound(begin, end, word, [&](uint32_t w, uint32_t part) {
-                    return w < block_[part].word_begin;
-                });
+            const auto after = std::upper_bound(begin, end, word, [&](uint32_t w, uint32_t part) {
+                return w < block_[part].word_begin;
+            });
             Block& to = block_[*(after - 1)];
             copyVertex(b, p * kPageVertices + i, to, add(to, from.first[i]));
             for (const auto bits : {&SplitPage::alive, &SplitPage::opened, &SplitPage::grown})
@@ -277,13 +279,14 @@ void SplitBlocks::commit() {
     parallelFor(cut_blocks.size(), [&](size_t i) { cut(cut_blocks[i], parts); });
     forChanged([&](uint32_t b) { number(b); });
     vertices_ = 0;
-    size_t pages = 0;
     for (Block& b : block_) {
         b.changed = false;
         vertices_ += b.alive;
-        pages += b.page.size();
     }
-    if (free_pages_.size() > pages / 4 + 2 * kSlabPages) giveBack();
+    // What was free all the time.
+    least_free_ = std::min(least_free_, free_pages_.size());
+    constexpr uint64_t kCommits = 64;
+    if (version_ % kCommits == 0) giveBack(least_free_);
 }
 
 }  // namespace pietra::pmesh

@@ -6,18 +6,26 @@
 // below, and its place in the order of leaves. All that is as of the last commit(), which also cuts
 // blocks of many vertices and joins those of few.
 //
-// Deterministic, but for where in memory pages lie. Memory: bytes(). Thread-safe: what is const, and
-// add() to different blocks.
+// Deterministic, but for where in memory pages lie. Memory: bytes(). Thread-safe: what is const,
+// and add() to different blocks.
 
 #include <bit>
 #include <cstdlib>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <vector>
 
 #include "methods/pmesh/front/split_page.h"
 
 namespace pietra::pmesh {
+
+/// GCC 12 takes functions that only prefetch for such without effects, and removes calls of them:
+/// an effect keeps them.
+inline void prefetchLines(const void* from, size_t bytes) {
+    for (size_t i = 0; i < bytes; i += 64) __builtin_prefetch(static_cast<const char*>(from) + i);
+    asm volatile("");
+}
 
 class SplitBlocks {
 public:
@@ -51,6 +59,12 @@ public:
     SplitPage& page(const Block& b, uint32_t page) const {
         const uint32_t place = b.page[page];
         return pool_[place / kSlabPages][place % kSlabPages];
+    }
+    template <class Column>
+    void prefetch(uint32_t block, Column SplitPage::*column) const {
+        const Block& b = block_[block];
+        for (uint32_t p = 0; p < b.page.size(); ++p)
+            prefetchLines(&(page(b, p).*column), sizeof(Column));
     }
     Slot at(const Block& b, uint32_t slot) const {
         return {page(b, slot / kPageVertices), slot % kPageVertices};
@@ -90,6 +104,10 @@ public:
         return {before, uint32_t(block_[before].order.size()) - 1};
     }
 
+    /// The keys of those.
+    void ownersOf(std::span<const Leaf> leaf, std::span<uint32_t> key) const;
+    static Place placeOf(uint32_t key) { return {key >> kRankBits, key & kRankMask}; }
+
     /// A slot in the block, whose leaves `first` is one of. All but that is to be filled in.
     uint32_t add(Block& b, Leaf first);
     /// Bits of SplitPage::alive may have been cleared; Block::alive and first_free say so.
@@ -97,7 +115,7 @@ public:
 
     size_t bytes() const;
     /// Pages that are not used go back to the system.
-    void giveBack();
+    void giveBack() { giveBack(free_pages_.size()); }
     /// So much a vertex more takes, at most, but for a few KiB.
     static constexpr size_t kVertexBytes = sizeof(SplitPage) / kPageVertices * 3 / 2 + 16;
 
@@ -116,6 +134,7 @@ private:
         size_t parts_begin, parts_end;
     };
 
+    void giveBack(size_t count);
     uint32_t takePage();
     void dropPage(Block& b);
     void copyVertex(const Block& from, uint32_t slot, Block& to, uint32_t into);
@@ -140,6 +159,7 @@ private:
     mutable std::vector<std::vector<uint32_t>> words_;  ///< by slab
     std::mutex pool_mutex_;
     std::vector<uint32_t> free_pages_, clean_pages_;  ///< the latter take no memory
+    size_t least_free_ = 0;
     size_t vertices_ = 0;
     uint64_t version_ = 0;
 };

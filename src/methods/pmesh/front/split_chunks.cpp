@@ -32,8 +32,9 @@ public:
     }
     /// kNone if it is new; then it must be set.
     uint32_t& operator[](uint32_t key) {
-        size_t at = key * 0x9e3779b1u % slot_.size();
-        while (slot_[at].stamp == stamp_ && slot_[at].key != key) at = (at + 1) % slot_.size();
+        const size_t mask = slot_.size() - 1;
+        size_t at = (key * 0x9e3779b1u >> 8) & mask;
+        while (slot_[at].stamp == stamp_ && slot_[at].key != key) at = (at + 1) & mask;
         if (slot_[at].stamp != stamp_) slot_[at] = {stamp_, key, kNone};
         return slot_[at].number;
     }
@@ -83,11 +84,6 @@ size_t bytesOf(const std::vector<T>& elements) {
     return elements.capacity() * sizeof(T);
 }
 
-void sortUnique(std::vector<uint32_t>& v) {
-    std::sort(v.begin(), v.end());
-    v.erase(std::unique(v.begin(), v.end()), v.end());
-}
-
 }  // namespace
 
 SplitChunks::SplitChunks(const ResidentSplits& nodes, const SplitBlocks& blocks)
@@ -113,13 +109,13 @@ SplitChunks::SplitChunks(const ResidentSplits& nodes, const SplitBlocks& blocks)
     update();
 }
 
-void SplitChunks::addBaseTriangles(Leaf root, std::vector<std::array<Leaf, 3>>& corners,
-                                   bool& closed) const {
+void SplitChunks::addBaseTriangles(Leaf root, std::vector<Leaf>& corners, bool& closed) const {
     const SplitBase& base = nodes_.forest().base;
     const size_t r = size_t(std::lower_bound(root_first_.begin(), root_first_.end(), root) -
                             root_first_.begin());
     for (uint32_t i = base_begin_[r]; i < base_begin_[r + 1]; ++i) {
-        corners.push_back(base.triangle[base_order_[i]]);
+        const std::array<Leaf, 3>& leaf = base.triangle[base_order_[i]];
+        corners.insert(corners.end(), leaf.begin(), leaf.end());
         closed &= base.closed[base_order_[i]] != 0;
     }
 }
@@ -143,64 +139,79 @@ void SplitChunks::update() {
 }
 
 void SplitChunks::make(uint32_t block) {
-    thread_local Numbers number;
-    thread_local std::vector<std::array<Leaf, 3>> corners;
-    thread_local std::vector<SplitBlocks::Place> used;
-    LiveChunk& chunk = chunk_[block];
+    thread_local std::vector<SplitBlocks::Place> vertex;
     Made& made = made_[block];
     made.version = blocks_.latestVersion();
     made.on_others.clear();
-    const auto own = uint32_t(blocks_.countOf(block));
+    vertex.clear();
+    blocks_.prefetch(block, &SplitPage::leaf);
+    for (uint32_t r = 0; r < blocks_.countOf(block); ++r) vertex.push_back({block, r});
+    makeTriangles(block, vertex);
+    blocks_.prefetch(block, &SplitPage::vertex);
+    blocks_.prefetch(block, &SplitPage::next);
+    makeVertices(chunk_[block], vertex);
+}
+
+/// Adds vertices of other blocks.
+void SplitChunks::makeTriangles(uint32_t block, std::vector<SplitBlocks::Place>& vertex) {
+    thread_local Numbers number, other_block;
+    thread_local std::vector<Leaf> corners;
+    thread_local std::vector<uint32_t> owner;
+    LiveChunk& chunk = chunk_[block];
     corners.clear();
-    used.clear();
     bool closed = true;
-    for (uint32_t r = 0; r < own; ++r) {
-        used.push_back({block, r});
-        const SplitBlocks::Slot slot = blocks_.at({block, r});
-        const std::array<Leaf, 6>& leaf = slot.page.leaf[slot.i];
+    for (const SplitBlocks::Place p : vertex) {
+        const auto [page, i] = blocks_.at(p);
+        const std::array<Leaf, 6>& leaf = page.leaf[i];
         const size_t before = corners.size();
-        if (leaf[0] != leaf[1]) corners.push_back({leaf[0], leaf[1], leaf[2]});
-        if (leaf[3] != leaf[4]) corners.push_back({leaf[3], leaf[4], leaf[5]});
-        if (corners.size() > before) closed &= (slot.page.closed >> slot.i & 1) != 0;
-        if (slot.page.made[slot.i] == kNoSplit)
-            addBaseTriangles(slot.page.first[slot.i], corners, closed);
+        if (leaf[0] != leaf[1]) corners.insert(corners.end(), leaf.begin(), leaf.begin() + 3);
+        if (leaf[3] != leaf[4]) corners.insert(corners.end(), leaf.begin() + 3, leaf.end());
+        if (corners.size() > before) closed &= (page.closed >> i & 1) != 0;
+        if (page.made[i] == kNoSplit) addBaseTriangles(page.first[i], corners, closed);
     }
-    resizeTight(chunk.mesh.triangle, corners.size());
-    number.begin(3 * corners.size());
-    for (size_t t = 0; t < corners.size(); ++t)
-        for (size_t k = 0; k < 3; ++k) {
-            const SplitBlocks::Place p = blocks_.ownerOf(corners[t][k]);
-            if (p.block == block) {
-                chunk.mesh.triangle[t][k] = p.rank;
-                continue;
-            }
-            uint32_t& n = number[blocks_.keyOf(p)];
-            if (n == kNone) {
-                n = uint32_t(used.size());
-                used.push_back(p);
-                made.on_others.push_back(p.block);
-            }
-            chunk.mesh.triangle[t][k] = n;
-            // A vertex that comes before the leaf, and after the one that has it now.
-            made.on_others.push_back(blocks_.blockOf(corners[t][k]));
+    owner.resize(corners.size());
+    blocks_.ownersOf(corners, owner);
+    number.begin(corners.size());
+    other_block.begin(corners.size());
+    resizeTight(chunk.mesh.triangle, corners.size() / 3);
+    for (size_t c = 0; c < corners.size(); ++c) {
+        const SplitBlocks::Place p = SplitBlocks::placeOf(owner[c]);
+        uint32_t& corner = chunk.mesh.triangle[c / 3][c % 3];
+        if (p.block == block) {
+            corner = p.rank;
+            continue;
         }
-    // What hangs below a vertex of a block before is one's own affair, but for its place.
-    sortUnique(made.on_others);
+        uint32_t& n = number[owner[c]];
+        if (n == kNone) {
+            n = uint32_t(vertex.size());
+            vertex.push_back(p);
+            const auto [page, i] = blocks_.at(p);
+            prefetchLines(&page.vertex[i], sizeof(SplitVertex));
+            // A leaf gets another owner only where this one is split or merged.
+            if (uint32_t& seen = other_block[p.block]; seen == kNone)
+                seen = 0, made_[block].on_others.push_back(p.block);
+        }
+        corner = n;
+    }
 
     chunk.version = corners.empty() ? 0 : version_;
+    chunk.closed = closed;
+}
+
+void SplitChunks::makeVertices(LiveChunk& chunk, std::span<const SplitBlocks::Place> vertex) const {
     const Lattice& lattice = nodes_.forest().lattice;
     const SplitGrid& grid = nodes_.forest().grid;
     const WordLayout layout = nodes_.forest().layout;
-    resizeTight(chunk.mesh.position, used.size());
-    resizeTight(chunk.mesh.normal, used.size());
-    resizeTight(chunk.mesh.colour, used.size() * layout.colours);
-    resizeTight(chunk.mesh.scalar, used.size() * layout.scalars);
+    resizeTight(chunk.mesh.position, vertex.size());
+    resizeTight(chunk.mesh.normal, vertex.size());
+    resizeTight(chunk.mesh.colour, vertex.size() * layout.colours);
+    resizeTight(chunk.mesh.scalar, vertex.size() * layout.scalars);
     Box3i box;
     std::array<uint16_t, 3> min{0xffff, 0xffff, 0xffff}, max{};
     uint16_t error = 0;
-    for (size_t i = 0; i < used.size(); ++i) {
-        const auto [page, s] = blocks_.at(used[i]);
-        const uint32_t* const words = blocks_.wordsOf(used[i]);
+    for (size_t i = 0; i < vertex.size(); ++i) {
+        const auto [page, s] = blocks_.at(vertex[i]);
+        const uint32_t* const words = blocks_.wordsOf(vertex[i]);
         chunk.mesh.position[i] = drawnPosition(page.vertex[s], lattice.shift);
         chunk.mesh.normal[i] = unpackNormal(page.vertex[s].normal);
         if (words) setVertex({words, layout.words()}, layout, chunk.mesh, i);
@@ -213,11 +224,14 @@ void SplitChunks::make(uint32_t block) {
         }
     }
     chunk.box = box;
-    chunk.closed = closed;
     const Vec3f centre = 0.5f * (Vec3f(box.min) + Vec3f(box.max));
     chunk.bounds = chunk.saturated = {centre, 0};
-    for (const Vec3i& p : chunk.mesh.position)
-        chunk.bounds.radius = std::max(chunk.bounds.radius, glm::length(centre - Vec3f(p)));
+    float squared = 0;
+    for (const Vec3i& p : chunk.mesh.position) {
+        const Vec3f d = centre - Vec3f(p);
+        squared = std::max(squared, glm::dot(d, d));
+    }
+    chunk.bounds.radius = std::sqrt(squared);
     if (error > 0) {
         Vec3d farthest(0);
         for (int k = 0; k < 3; ++k) {
@@ -230,7 +244,7 @@ void SplitChunks::make(uint32_t block) {
         }
         chunk.saturated.radius = float(glm::length(farthest));
     }
-    chunk.cone = closed ? coneOf(chunk.mesh) : NormalCone{};
+    chunk.cone = chunk.closed ? coneOf(chunk.mesh) : NormalCone{};
     chunk.error = float(double(NestedCriterion::errorOf(error)) * grid.unit(lattice));
     constexpr int kAnOctave = 7;
     const uint16_t coarsest = nodes_.forest().row[0].criterion.error;

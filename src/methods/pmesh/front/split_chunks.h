@@ -32,7 +32,9 @@ private:
     };
     bool isStale(uint32_t block) const;
     void make(uint32_t block);
-    void addBaseTriangles(Leaf root, std::vector<std::array<Leaf, 3>>& corners, bool& closed) const;
+    void makeTriangles(uint32_t block, std::vector<SplitBlocks::Place>& vertex);
+    void makeVertices(LiveChunk& chunk, std::span<const SplitBlocks::Place> vertex) const;
+    void addBaseTriangles(Leaf root, std::vector<Leaf>& corners, bool& closed) const;
 
     const ResidentSplits& nodes_;
     const SplitBlocks& blocks_;

@@ -8,11 +8,7 @@
 namespace pietra::pmesh {
 namespace {
 
-constexpr size_t kBatch = 4;  ///< blocks of a task
-
-void prefetchLines(const void* from, size_t bytes) {
-    for (size_t i = 0; i < bytes; i += 64) __builtin_prefetch(static_cast<const char*>(from) + i);
-}
+constexpr size_t kBatch = 8;  ///< blocks of a task
 
 int32_t trianglesOf(const std::array<Leaf, 6>& leaf) {
     return int32_t(leaf[0] != leaf[1]) + int32_t(leaf[3] != leaf[4]);
@@ -35,7 +31,8 @@ SplitFront::SplitFront(const ResidentSplits& nodes)
         NestedCriterion ever;
         ever.error = NestedCriterion::kEver;
         page.birth.set(i, ever);
-        page.next.set(i, root.split != kNoSplit ? nodes.rootCriterion(root.split) : NestedCriterion());
+        page.next.set(i,
+                      root.split != kNoSplit ? nodes.rootCriterion(root.split) : NestedCriterion());
         page.split[i] = root.split;
         page.made[i] = kNoSplit;
         page.last[i] = page.parent[i] = kNoLeaf;
@@ -133,7 +130,8 @@ void SplitFront::merge(uint32_t block, Work& work) {
             const uint32_t* words = nullptr;
             if (const size_t a_vertex = blocks_.wordsAVertex())
                 words = blocks_.wordsOf(b, p * kPageVertices + i) + a_vertex;
-            const Merge m{v, page.made[i], page.parent[i], page.birth.get(i), page.merged[i], words};
+            const Merge m{v,    page.made[i], page.parent[i], page.birth.get(i), page.merged[i],
+                          words};
             if (v.block == block)
                 applyMerge(m);
             else
@@ -169,12 +167,14 @@ size_t SplitFront::countSplits(const SplitView& view, size_t enough) const {
             forBits(page.opened, [&](uint32_t i) {
                 if (view.needs(page.next.get(i))) stack.push_back(page.split[i]);
                 for (; !stack.empty() && here <= enough; ++here) {
-                    const ResidentSplit& s = nodes_.at(stack.back());
+                    const SplitId id = stack.back();
+                    const ResidentSplit& s = nodes_.at(id);
+                    const std::array<SplitId, 2> child = nodes_.childrenOf(id, s);
                     stack.pop_back();
-                    for (const size_t end_of : {0u, 1u})
-                        if (s.child[end_of] != kNoSplit && view.needs(s.criterion[end_of]) &&
-                            mayOpen(s.child[end_of], s.criterion[end_of]))
-                            stack.push_back(s.child[end_of]);
+                    for (const size_t k : {0u, 1u})
+                        if (child[k] != kNoSplit && view.needs(s.criterion[k]) &&
+                            mayOpen(child[k], s.criterion[k]))
+                            stack.push_back(child[k]);
                 }
             });
             count += here;
@@ -233,9 +233,8 @@ void SplitFront::look(Block& b, const SplitView& view) const {
         if (std::popcount(grown) > 2)
             needed = scanNext(view, page) & grown;
         else
-            forBits(grown, [&](uint32_t i) {
-                needed |= uint32_t(view.needs(page.next.get(i))) << i;
-            });
+            forBits(grown,
+                    [&](uint32_t i) { needed |= uint32_t(view.needs(page.next.get(i))) << i; });
         const uint32_t open = mayOpen(page, needed);
         if (open != 0 && page.opened == 0) b.opening.push_back(p);
         page.opened |= open;
@@ -249,29 +248,40 @@ void SplitFront::markGrown(Block& b, uint32_t slot) const {
     page.grown |= 1u << i;
 }
 
-/// Until only what other blocks have to do with is left, or there is too much.
-void SplitFront::splitAll(uint32_t block, const SplitView& view, Work& work) {
-    Block& b = blocks_.all()[block];
-    std::vector<uint16_t> opening;
-    for (look(b, view); !b.opening.empty() && b.alive < kMostInRound; look(b, view)) {
-        opening.clear();
-        opening.swap(b.opening);
-        for (const uint16_t p : opening) {
-            const SplitPage& page = blocks_.page(b, p);
-            forBits(page.opened, [&](uint32_t i) {
-                prefetchLines(&nodes_.at(page.split[i]), sizeof(ResidentSplit));
-            });
+/// In these blocks, until only what others have to do with is left, or there is too much. Together:
+/// while splits of one come from memory, others go on.
+void SplitFront::splitAll(size_t begin, size_t end, const SplitView& view, Work& work) {
+    const std::span some(blocks_.all().begin() + ptrdiff_t(begin), end - begin);
+    for (bool busy = true; busy;) {
+        busy = false;
+        for (Block& b : some) {
+            look(b, view);
+            if (b.opening.empty() || b.alive >= kMostInRound) continue;
+            busy = true;
+            for (const uint16_t p : b.opening) {
+                const SplitPage& page = blocks_.page(b, p);
+                forBits(page.opened, [&](uint32_t i) {
+                    prefetchLines(&nodes_.at(page.split[i]), sizeof(ResidentSplit));
+                });
+            }
         }
-        for (const uint16_t p : opening) {
-            SplitPage& page = blocks_.page(b, p);
-            forBits(std::exchange(page.opened, 0), [&](uint32_t i) {
-                if (blocks_.blockOf(nodes_.at(page.split[i]).name) == block)
-                    applySplit(b, p * kPageVertices + i, b, work);
-                else
-                    work.split.push_back({block, p * kPageVertices + i});
-            });
-        }
+        for (Block& b : some)
+            if (!b.opening.empty() && b.alive < kMostInRound) splitOpened(b, work);
     }
+}
+
+void SplitFront::splitOpened(Block& b, Work& work) {
+    const auto block = uint32_t(&b - blocks_.all().data());
+    for (const uint16_t p : b.opening) {
+        SplitPage& page = blocks_.page(b, p);
+        forBits(std::exchange(page.opened, 0), [&](uint32_t i) {
+            if (blocks_.blockOf(nodes_.at(page.split[i]).name) == block)
+                applySplit(b, p * kPageVertices + i, b, work);
+            else
+                work.split.push_back({block, p * kPageVertices + i});
+        });
+    }
+    b.opening.clear();
 }
 
 void SplitFront::applySplit(Block& b, uint32_t slot, Block& of_u, Work& work) {
@@ -286,12 +296,13 @@ void SplitFront::applySplit(Block& b, uint32_t slot, Block& of_u, Work& work) {
     u.merged[j] = v.vertex[i];
     u.parent[j] = v.last[i];
     u.leaf[j] = split.corner;
-    u.closed |= uint32_t(split.closed) << j;
+    u.closed |= uint32_t(split.closed()) << j;
     v.last[i] = u.last[j] = split.name;
-    v.vertex[i] = split.vertex[0];
-    u.vertex[j] = split.vertex[1];
-    v.split[i] = split.child[0];
-    u.split[j] = split.child[1];
+    v.vertex[i] = split.vertex(0);
+    u.vertex[j] = split.vertex(1);
+    const std::array<SplitId, 2> child = nodes_.childrenOf(id, split);
+    v.split[i] = child[0];
+    u.split[j] = child[1];
     // A good file's are within.
     v.next.set(i, own.within(split.criterion[0]));
     u.next.set(j, own.within(split.criterion[1]));
@@ -360,8 +371,8 @@ SplitCounts SplitFront::adapt(const SplitView& keep, const SplitLimits& limits) 
             blocks_.commit();
             forBlocks([&](uint32_t b) { findBusy(all[b]); });
         }
-        forBlocks([&](uint32_t b) {
-            if (isBusy(all[b])) splitAll(b, view, work.local());
+        parallelForSlices(all.size(), kBatch, [&](size_t begin, size_t end) {
+            splitAll(begin, end, view, work.local());
         });
         splitAcross(work);
     }

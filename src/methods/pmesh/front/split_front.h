@@ -94,7 +94,8 @@ private:
                            SplitCounts& counts) const;
     void reopen(Block& b, const SplitView& view) const;
     void look(Block& b, const SplitView& view) const;
-    void splitAll(uint32_t block, const SplitView& view, Work& work);
+    void splitAll(size_t begin, size_t end, const SplitView& view, Work& work);
+    void splitOpened(Block& b, Work& work);
     void applySplit(Block& b, uint32_t slot, Block& of_u, Work& work);
     void markGrown(Block& b, uint32_t slot) const;
     void splitAcross(PerThread<Work>& work);

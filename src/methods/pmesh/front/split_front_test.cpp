@@ -61,9 +61,10 @@ struct Made {
         for (NodeIndex n = 0; n < forest.row.size(); ++n)
             for (uint32_t s = 0; s < forest.node[n].split.size(); ++s) {
                 const ResidentSplit& split = nodes.at(splitId(n, s));
+                const std::array<SplitId, 2> child = nodes.childrenOf(splitId(n, s), split);
                 for (const size_t end : {0u, 1u})
-                    if (split.child[end] != kNoSplit)
-                        criterion[nodes.at(split.child[end]).name] = split.criterion[end];
+                    if (child[end] != kNoSplit)
+                        criterion[nodes.at(child[end]).name] = split.criterion[end];
             }
     }
     ResidentSplits all() const {
@@ -123,7 +124,9 @@ struct Named {
 
 Named namedOf(const SplitFront& front, const SplitForest& forest) {
     Named named;
-    const auto name = [&](Leaf leaf) { return front.blocks().firstLeaf(front.blocks().ownerOf(leaf)); };
+    const auto name = [&](Leaf leaf) {
+        return front.blocks().firstLeaf(front.blocks().ownerOf(leaf));
+    };
     for (uint32_t b = 0; b < front.blocks().all().size(); ++b) {
         Leaf last = 0;
         for (uint32_t r = 0; r < front.blocks().countOf(b); ++r) {
