@@ -130,7 +130,7 @@ void ResidentSplits::look(const SplitView& view) {
         state_[n].last_used = frame_;
         for (const size_t side : {0u, 1u}) {
             const NodeIndex c = forest_.row[n].child[side];
-            if (c == kNoNode) continue;
+            if (c == kNoNode || !view.needs(forest_.row[c].criterion)) continue;
             const auto& parts = node_[n]->child_parts[side];
             const auto needed = [&](const NestedCriterion& part) { return view.needs(part); };
             if (isLoaded(c)) {

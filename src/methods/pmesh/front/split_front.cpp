@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 
 namespace pietra::pmesh {
@@ -68,7 +69,7 @@ void SplitFront::decide(Block& b, const SplitView& view, Work& work) {
     for (uint32_t p = 0; p < b.page.size(); ++p) {
         SplitPage& page = blocks_.page(b, p);
         if (p + 1 < b.page.size())
-            prefetchLines(&blocks_.page(b, p + 1), 2 * sizeof(CriterionPage));
+            prefetchLines(&blocks_.page(b, p + 1), offsetof(SplitPage, split));
         const PageNeeds needs = scanPage(view, page);
         const uint32_t dropped = page.alive & ~needs.birth;
         if (dropped != 0) {

@@ -31,21 +31,23 @@ struct CriterionPage {
 
 /// A slot is an active vertex, with the split that it is named after.
 struct alignas(4096) SplitPage {
+    // What each frame reads.
     CriterionPage birth;  ///< of the split that it came with
-    CriterionPage next;   ///< of its next split; error 0 where there is none, or no vertex
-    std::array<Leaf, kPageVertices> first;     ///< its first leaf
+    CriterionPage next;   ///< of its next split; error 0 where there is none
+    uint32_t alive;       ///< a bit a slot
+    uint32_t dropped;     ///< in this frame
+    uint32_t opened;      ///< to be split
+    uint32_t grown;       ///< their next split is another one
+    uint32_t closed;      ///< their triangles are of a closed component
+    // What operations read.
     std::array<SplitId, kPageVertices> split;  ///< its next one, or kNoSplit
+    std::array<Leaf, kPageVertices> first;     ///< its first leaf
     std::array<SplitId, kPageVertices> made;   ///< the one that it came with, or kNoSplit: a root
     std::array<Leaf, kPageVertices> last;      ///< the name of the split above, or kNoLeaf
     std::array<Leaf, kPageVertices> parent;    ///< of the one above that which it came with
     std::array<SplitVertex, kPageVertices> vertex;
     std::array<SplitVertex, kPageVertices> merged;        ///< what undoing that makes of v
     std::array<std::array<Leaf, 6>, kPageVertices> leaf;  ///< of the triangles it came with
-    uint32_t alive;                                       ///< a bit a slot
-    uint32_t dropped;                                     ///< in this frame, and not yet merged
-    uint32_t opened;                                      ///< to be split
-    uint32_t grown;                                       ///< their next split is another one
-    uint32_t closed;  ///< their triangles are of a closed component
 };
 static_assert(sizeof(SplitPage) == 4096);
 
