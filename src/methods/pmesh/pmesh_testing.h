@@ -14,6 +14,7 @@
 #include "io/memory_source.h"
 #include "methods/pmesh/build.h"
 #include "methods/pmesh/in_core_builder.h"
+#include "methods/pmesh/split_view.h"
 #include "simplify/test_meshes.h"
 
 namespace pietra::pmesh {
@@ -53,14 +54,6 @@ inline test::Shape dented(test::Shape shape, double amplitude) {
     return shape;
 }
 
-/// Long edges with short ones beside them: every other row of a sheet lies close to the next. What
-/// moves along the former is too coarse for the latter, without dummies.
-inline test::Shape closeRows(int rows) {
-    test::Shape sheet = test::gridShape(rows, 0.05);
-    for (Vec3d& p : sheet.position) p.y += std::llround(p.y * rows) % 2 == 1 ? 0.99 / rows : 0.0;
-    return sheet;
-}
-
 inline std::vector<TestMesh> testMeshes() {
     using namespace test;
     return {
@@ -94,6 +87,26 @@ inline BuildSettings smallDiamonds(uint32_t leaf_triangles, const std::string& p
     settings.patch_triangles = leaf_triangles;
     settings.precision = {PrecisionSetting::Kind::kStep, 1.0};
     return settings;
+}
+
+inline SplitView randomView(std::mt19937& random, const SplitForest& forest) {
+    const NestedCriterion& c = forest.row.front().criterion;
+    const Vec3d size(c.max[0], c.max[1], c.max[2]);
+    std::uniform_real_distribution<float> place(-0.5f, 1.5f), power(-3, 12);
+    std::normal_distribution<float> any;
+    SplitView view;
+    for (int k = 0; k < 3; ++k) view.eye[size_t(k)] = place(random) * float(size[k]);
+    view.reach = std::exp2(power(random));
+    view.hides_backs = random() % 3 == 0;
+    if (random() % 2 == 0) return view;
+    for (size_t i = 0; i < 4; ++i) {
+        const Vec3f n = glm::normalize(Vec3f(any(random), any(random), any(random)));
+        for (int k = 0; k < 3; ++k) {
+            view.side[i][size_t(k)] = n[k];
+            view.at_eye[i] += n[k] * view.eye[size_t(k)];
+        }
+    }
+    return view;
 }
 
 /// By diamonds, into a file.

@@ -164,6 +164,16 @@ bool ResidentSplits::isBlocked(const NestedCriterion& c) const {
     return found != 0;
 }
 
+std::vector<NestedCriterion> ResidentSplits::blocking() const {
+    std::vector<NestedCriterion> all(blocking_.error.size());
+    for (size_t i = 0; i < all.size(); ++i) {
+        for (size_t k = 0; k < 3; ++k)
+            all[i].min[k] = blocking_.min[k][i], all[i].max[k] = blocking_.max[k][i];
+        all[i].error = blocking_.error[i];
+    }
+    return all;
+}
+
 std::vector<NodeIndex> ResidentSplits::requests(size_t most) const {
     std::vector<NodeIndex> nodes;
     for (const NodeIndex n : asked_)

@@ -82,6 +82,8 @@ public:
     void look(const SplitView& view);
     bool anyBlocks() const { return !blocking_.error.empty(); }
     bool isBlocked(const NestedCriterion& c) const;
+    /// What isBlocked() looks through; normals mean nothing.
+    std::vector<NestedCriterion> blocking() const;
     /// At most so many, none loaded, in the order of need.
     std::vector<NodeIndex> requests(size_t most) const;
     /// At most so many of those that this view wants, parents first, and which fit without those
@@ -105,6 +107,7 @@ public:
     bool evictOldest();
 
     size_t loaded() const { return loaded_.size(); }
+    std::span<const NodeIndex> loadedNodes() const { return loaded_; }  ///< in no order
     size_t required() const { return wanted_ + asked_.size(); }  ///< by the last look()
     size_t missing() const { return asked_.size(); }             ///< likewise, asked for
 

@@ -95,26 +95,6 @@ struct Made {
     SplitForest forest;
 };
 
-SplitView randomView(std::mt19937& random, const SplitForest& forest) {
-    const NestedCriterion& c = forest.row.front().criterion;
-    const Vec3d size(c.max[0], c.max[1], c.max[2]);
-    std::uniform_real_distribution<float> place(-0.5f, 1.5f), power(-3, 12);
-    std::normal_distribution<float> any;
-    SplitView view;
-    for (int k = 0; k < 3; ++k) view.eye[size_t(k)] = place(random) * float(size[k]);
-    view.reach = std::exp2(power(random));
-    view.hides_backs = random() % 3 == 0;
-    if (random() % 2 == 0) return view;
-    for (size_t i = 0; i < 4; ++i) {
-        const Vec3f n = glm::normalize(Vec3f(any(random), any(random), any(random)));
-        for (int k = 0; k < 3; ++k) {
-            view.side[i][size_t(k)] = n[k];
-            view.at_eye[i] += n[k] * view.eye[size_t(k)];
-        }
-    }
-    return view;
-}
-
 /// A mesh with names: first leaves.
 struct Named {
     std::map<Leaf, SplitVertex> vertex;
