@@ -19,9 +19,9 @@ import flying
 PIXEL_SIZE = "1920x1080"
 VERTEX_BYTES, TRIANGLE_BYTES = 24, 12  # of an indexed mesh: position and normal as floats
 MIB = 2**20
-LARGE = 2_000_000  # operations: an indexed mesh is not drawn, dummies are not counted
-# Of what is held: a node with 682 operations, an operation, a vertex with its triangles and chunk.
-NODE, OPERATION, VERTEX = 21_824, 32, 276
+LARGE = 2_000_000  # operations: an indexed mesh is not drawn
+# Of what is held: a node, an operation, a vertex with its triangles and chunk.
+NODE, OPERATION, VERTEX = 73_656, 108, 280
 MODES = {  # method, options of bench
     "out of core": ("pmesh", []),
     "in core": ("pmesh", ["--cull", "frustum", "--ram", "8G"]),
@@ -44,20 +44,11 @@ def indexed_bytes(made):
     return (VERTEX_BYTES * made["input"]["vertices"] + TRIANGLE_BYTES * made["input"]["triangles"])
 
 
-def dummies(model, operations, options):
-    """What moves vertices and makes none; to count them takes 300 bytes an operation."""
-    if operations > LARGE:
-        return ""
-    of = lambda *what: common.report("extract", model, "-o", f"{options.folder}/cut.ply", *what,
-                                     folder=options.folder)["vertices"]
-    return f"{operations + of('--triangles', 1) - of('--full'):,}"
-
-
-def holds(name, model, made, options):
+def holds(name, made):
     """Tables 2 and 3."""
     vertices, triangles = made["input"]["vertices"], made["input"]["triangles"]
     operations = made["vertices_stored"]
-    return [name, f"{vertices:,}", f"{triangles:,}", f"{operations:,}", dummies(model, operations, options),
+    return [name, f"{vertices:,}", f"{triangles:,}", f"{operations:,}",
             made["levels"], made["nodes"], f"{made['bytes'] / operations:.1f}",
             f"{100 * made['bytes'] / indexed_bytes(made):.0f}"]
 
@@ -155,14 +146,14 @@ def main():
             continue
         name = pathlib.Path(name).stem
         made = {method: build(mesh, method, options) for method in ("pmesh", "tetra")}
-        held.append(holds(name, *made["pmesh"], options))
+        held.append(holds(name, made["pmesh"][1]))
         for path in options.paths.split(","):
             flown += flights(name, made, path, options)
             print(*(" | ".join(row) for row in flown[-len(MODES):]), sep="\n", flush=True)
             if options.views:
                 equal += at_equal_errors(name, {m: model for m, (model, _) in made.items()}, path,
                                          options)
-    print(common.table(["mesh", "vertices", "triangles", "operations", "dummies", "levels", "nodes",
+    print(common.table(["mesh", "vertices", "triangles", "operations", "levels", "nodes",
                         "bytes an operation", "% of an indexed mesh"], held))
     print(common.table(["mesh", "path", "", "triangles", "of out of core", "memory, MiB", "by its table 1", "frame, ms",
                         "adapt, ms", "stall_p99", "overhead"], flown))
