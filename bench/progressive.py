@@ -53,6 +53,15 @@ def holds(name, made):
             f"{100 * made['bytes'] / indexed_bytes(made):.0f}"]
 
 
+def same_path(model, path, options):
+    """A file of it: models place standard paths by what they draw first, each its own."""
+    file = pathlib.Path(options.folder, f"{pathlib.Path(model).stem}-{path}.json")
+    report = common.report("bench", model, "--path", path, "--frames", 2, "--renderer", "none",
+                           "--up", options.up, folder=options.folder)
+    file.write_text(json.dumps(report["path"]))
+    return file
+
+
 def fly(model, path, mode, options):
     extra = MODES[mode][1]
     chosen = [x for k, v in (("--ram", options.ram), ("--pixels", options.pixels))
@@ -87,7 +96,8 @@ def memory(mode, made, frame):
 def flights(name, made, path, options):
     """Tables 4 and 5, of the most complex frame; and the figures' series."""
     large = made["pmesh"][1]["vertices_stored"] > LARGE
-    reports = {mode: fly(made[method][0], path, mode, options)
+    file = same_path(made["tetra"][0], path, options)
+    reports = {mode: fly(made[method][0], file, mode, options)
                for mode, (method, _) in MODES.items() if not (large and mode == "indexed mesh")}
     series = list(zip(*(report["frames"] for report in reports.values())))
     with open(f"{options.folder}/figure-{name}-{path}.csv", "w", newline="") as out:
@@ -128,7 +138,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("meshes", nargs="*", default=["turbine", "dragon"])
     parser.add_argument("--paths", default="orbit,dive")
-    parser.add_argument("--frames", type=int, default=120)
+    parser.add_argument("--frames", type=int, default=480)
     parser.add_argument("--pixels", default=1)
     parser.add_argument("--ram", default="256M")
     parser.add_argument("--renderer", default="cpu")

@@ -53,6 +53,10 @@ def modules_in_order(root):
     return modules
 
 
+def method_of(module):
+    return module.folder.split("/")[1]
+
+
 def is_method(module):
     return module.folder.startswith("methods/")
 
@@ -65,7 +69,7 @@ def check_declarations(modules):
             other = above.get(name)
             if not other:
                 faults.append(f"{where}: {module.name} depends on {name}, which is not above it")
-            elif is_method(other) and is_method(module) and not module.folder.startswith(other.folder + "/"):
+            elif is_method(other) and is_method(module) and method_of(other) != method_of(module):
                 faults.append(f"{where}: the method {module.name} depends on the method {name}")
             elif other.folder.startswith("methods") and re.match(r"(runtime|render)\b", module.folder):
                 faults.append(f"{where}: {module.name} must not know methods, but depends on {name}")

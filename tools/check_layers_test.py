@@ -70,6 +70,14 @@ class CheckLayers(unittest.TestCase):
         self.assertFault({"src/methods/pmesh/CMakeLists.txt": "add_module(pmesh DEPENDS tetra)"},
                          "the method pmesh depends on the method tetra")
 
+    def test_folders_of_a_method_are_of_it(self):
+        deeper = "add_subdirectory(src/methods/pmesh/front)\nadd_subdirectory(src/methods/pmesh/gl)\n"
+        code, output = self.check({
+            "CMakeLists.txt": GOOD["CMakeLists.txt"] + deeper,
+            "src/methods/pmesh/front/CMakeLists.txt": "add_module(front DEPENDS pmesh)\n",
+            "src/methods/pmesh/gl/CMakeLists.txt": "add_module(pmesh_gl DEPENDS pmesh front)\n"})
+        self.assertEqual(code, 0, output)
+
     def test_renderers_know_no_method(self):
         self.assertFault({"src/render/raster/CMakeLists.txt": "add_module(raster DEPENDS tetra)"},
                          "raster must not know methods, but depends on tetra")

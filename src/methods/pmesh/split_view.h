@@ -29,7 +29,7 @@ struct SplitView {
     bool hides_backs = false;
     /// Null: nothing is hidden.
     std::shared_ptr<const Occlusion> occlusion;
-    static constexpr float kOutside = 8, kHidden = 8;
+    static constexpr float kOutside = 64, kHidden = 8;
 
     bool shows(const NestedCriterion& c, float from) const {
         float squared = 0, inside = 0;

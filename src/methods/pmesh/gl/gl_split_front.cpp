@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstring>
+#include <string>
 
 #include "base/check.h"
 #include "base/error.h"
@@ -136,8 +136,10 @@ GlSplitFront::GlSplitFront(const ResidentSplits& nodes, uint32_t most_nodes, uin
 }
 
 void GlSplitFront::makePrograms() {
-    const auto make = [](std::initializer_list<std::string_view> files) {
-        return makeProgram(splitText, {{GL_COMPUTE_SHADER, files}});
+    const std::string defines = fmt::format("#define OUTSIDE {:.1f}\n#define HIDDEN {:.1f}\n",
+                                            SplitView::kOutside, SplitView::kHidden);
+    const auto make = [&](std::initializer_list<std::string_view> files) {
+        return makeProgram(splitText, {{GL_COMPUTE_SHADER, files}}, defines);
     };
     books_ = make({"split_state.glsl", "split_books.comp.glsl"});
     decide_ = make({"split_state.glsl", "split_needs.glsl", "split_decide.comp.glsl"});

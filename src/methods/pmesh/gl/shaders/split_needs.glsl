@@ -65,7 +65,7 @@ bool shows(Criterion c, float from) {
             depth = depth + float(side[i][k] > 0.0 ? high(c, k) : low(c, k)) * side[i][k];
         inside = min(inside, depth);
     }
-    precise float rest = uintBitsToFloat(errorOf(c) << 16) * from + inside * 8.0;
+    precise float rest = uintBitsToFloat(errorOf(c) << 16) * from + inside * OUTSIDE;
     precise float product = rest * max(rest, 0.0);
     return product > squared;
 }
@@ -82,7 +82,7 @@ bool facesAway(Criterion c) {
 
 bool needs(Criterion c) {
     if (!shows(c, eye.w)) return false;
-    return hides_backs == 0u || shows(c, eye.w * 0.125) || !facesAway(c);
+    return hides_backs == 0u || shows(c, eye.w * (1.0 / HIDDEN)) || !facesAway(c);
 }
 
 bool isBlocked(Criterion c) {
