@@ -12,8 +12,11 @@
 namespace pietra {
 namespace {
 
-/// A tolerance, in pixels, at which everything is as coarse as can be.
-constexpr double kCoarsest = 1e9;
+/// A tolerance, in pixels, at which everything is as coarse as can be, but for what the eye is so
+/// near to that it may show at any.
+constexpr double kCoarse = 1e9;
+/// At which nothing shows, wherever the eye is: errors times this underflow.
+constexpr double kCoarsest = 1e36;
 
 }  // namespace
 
@@ -52,7 +55,7 @@ double SceneMeshes::adapt(uint32_t i, const FrameRequest& request, double pixels
     // No frame has a hole, if it takes time.
     while (!uploads_.update(i, pool_.model(i).chunks()) && task.pixels < kCoarsest) {
         uploads_fit_ = false;
-        task.pixels = 4 * std::max(task.pixels, 1.0);
+        task.pixels = task.pixels < kCoarse ? 4 * std::max(task.pixels, 1.0) : kCoarsest;
         task.milliseconds = std::numeric_limits<double>::infinity();
         task.only_look = false;
         (void)adaptNow(task);

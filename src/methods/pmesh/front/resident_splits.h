@@ -108,8 +108,8 @@ public:
 
     size_t loaded() const { return loaded_.size(); }
     std::span<const NodeIndex> loadedNodes() const { return loaded_; }  ///< in no order
-    size_t required() const { return wanted_ + asked_.size(); }  ///< by the last look()
-    size_t missing() const { return asked_.size(); }             ///< likewise, asked for
+    size_t required() const { return wanted_ + asked_.size(); }         ///< by the last look()
+    size_t missing() const { return asked_.size(); }                    ///< likewise, asked for
 
     /// What one node takes of this model.
     size_t nodeBytes() const {

@@ -265,6 +265,27 @@ TEST_P(EachForest, WhateverIsThereEveryFrameIsOneMesh) {
     EXPECT_TRUE(made.log.collapse.size() < 4000 || (waited > 10 && limited > 0));
 }
 
+/// Renderers without room rely on it (runtime/scene_meshes).
+TEST(SplitFront, AtTheCoarsestToleranceNothingIsLeftWhereverTheEyeIs) {
+    const Made made(onLattice(dented(test::sphereShape(40), 0.01), 1 << 20));
+    ResidentSplits nodes = made.all();
+    SplitFront front(nodes);
+    const SplitGrid& grid = made.forest.grid;
+    Camera camera;
+    camera.eye = Lattice{}.toInput(made.log.input.position[0]);
+    camera.target = camera.eye + Vec3d(1, 0, 0);
+    const auto adapt = [&](double pixels) {
+        const SplitView view =
+            splitView(View(camera, {640, 480}, Lattice{}), Lattice{}, grid, pixels);
+        nodes.look(view);
+        front.adapt(view);
+        return front.vertexCount();
+    };
+    const size_t roots = made.forest.base.root.size();
+    EXPECT_GT(adapt(1e9), roots);
+    EXPECT_EQ(adapt(1e36), roots);
+}
+
 TEST(SplitFront, TheNumberOfThreadsDoesNotShow) {
     const Made made(onLattice(dented(test::sphereShape(80), 0.01), 1 << 20));
     std::vector<std::vector<std::byte>> memory;
