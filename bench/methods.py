@@ -16,7 +16,7 @@ import flying
 import progressive
 
 TOLERANCES = (0.125, 0.25, 0.5, 1, 2, 4, 8)
-METHODS = ("tetra", "pmesh")
+METHODS = ("tetra", "pmesh", "cluster")
 
 
 class Model:
@@ -83,7 +83,7 @@ def replace_between(page, name, text):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("meshes", nargs="*", default=["turbine", "dragon", "moon-13M"])
+    parser.add_argument("meshes", nargs="*", default=["turbine", "dragon", "moon-2M"])
     parser.add_argument("--methods", default=",".join(METHODS))
     parser.add_argument("--paths", default="orbit,flight")
     parser.add_argument("--pixels", type=float, default=1)

@@ -54,12 +54,13 @@ void fuzzPage(std::span<const std::byte> bytes) {
 }
 
 void fuzzBlock(std::span<const std::byte> bytes) {
-    if (bytes.size() < 2) return;
+    if (bytes.size() < 3) return;
     const BlockEntry entry{0, 0, 0, 0, 0, 0, 0, uint32_t(bytes[0]), 0, uint32_t(bytes[1])};
     std::vector<Node> nodes;
     std::vector<PageRecord> pages;
     std::string fault;
-    if (decodeNodeBlock(bytes.subspan(2), entry, nodes, pages, fault))
+    const bool face_sizes = (bytes[2] & std::byte(1)) != std::byte(0);
+    if (decodeNodeBlock(bytes.subspan(3), entry, face_sizes, nodes, pages, fault))
         CHECK_EQ(nodes.size(), size_t(entry.node_count));
 }
 
@@ -124,7 +125,10 @@ void writeSeeds(const std::string& directory) {
     }
     const std::vector<Node> nodes(6);
     const std::vector<PageRecord> pages(3, PageRecord{1, 2, 2});
-    save("block", {std::byte(kBlock), std::byte(6), std::byte(3)}, encodeNodeBlock(nodes, pages));
+    for (const bool face_sizes : {false, true})
+        save(fmt::format("block-{}", int(face_sizes)),
+             {std::byte(kBlock), std::byte(6), std::byte(3), std::byte(face_sizes)},
+             encodeNodeBlock(nodes, pages, face_sizes));
 
     Budget budget(64 << 20);
     ModelWriter writer(directory + "/model.tmp", true, directory, budget);

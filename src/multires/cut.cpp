@@ -83,7 +83,7 @@ std::vector<Gain> gainsOf(std::span<const Node> nodes) {
 }
 
 bool refineInView(const Node& node, const View& view, double pixels) {
-    return !(view.errorInPixels(node.error, node.saturated) <= pixels);
+    return !(view.pixelsOf(node) <= pixels);
 }
 
 /// The sphere shows with a diameter of at most half the tolerance, wherever it is in the picture.

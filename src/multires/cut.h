@@ -38,7 +38,8 @@ Cut cutByError(std::span<const Node> nodes, double max_error);
 /// The cut of least error with at most `max_triangles` triangles. O(n log n).
 Cut cutByTriangles(std::span<const Node> nodes, uint64_t max_triangles);
 
-/// Refines while a node's error may show as more than `pixels` in the picture; nothing is culled.
+/// Refines while what the view selects by, a node's error or its faces, may show as more than
+/// `pixels` in the picture; nothing is culled.
 Cut cutByView(std::span<const Node> nodes, const View& view, double pixels);
 
 /// All groups with more than `height` steps of simplification below them are refined

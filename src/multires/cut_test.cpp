@@ -167,6 +167,28 @@ TEST(Cut, byViewKeepsTheToleranceAndIsNoFinerThanNeeded) {
     EXPECT_EQ(cutByView(model.nodes, view, 0).nodes, finestCut(model.nodes).nodes);
 }
 
+TEST(Cut, byFaceSizeGoesByThatAndNotByError) {
+    const ToyTerrain model = makeToyTerrain();
+    const Forest forest(model.nodes);
+    const Camera camera{{500, -900, 3000}, {1000, 1000, 1000}, {0, 0, 1}, 50};
+    const View view(camera, PictureSize{}, Lattice{}, SelectBy::kFaceSize);
+    const auto shows = [&](NodeIndex i) {
+        return view.errorInPixels(model.nodes[i].face_size, model.nodes[i].saturated);
+    };
+    for (const double pixels : {100.0, 300.0, 1000.0}) {
+        const Cut cut = cutByView(model.nodes, view, pixels);
+        expectConsistent(model.nodes, cut);
+        for (const NodeIndex i : cut.nodes) {
+            EXPECT_TRUE(model.nodes[i].isLeaf() || shows(i) <= pixels);
+            EXPECT_TRUE(forest.parent(i) == kNoNode || shows(forest.parent(i)) > pixels);
+        }
+        const View by_error(camera, PictureSize{}, Lattice{});
+        EXPECT_EQ(cutByView(model.nodes, view.byError(), pixels).nodes,
+                  cutByView(model.nodes, by_error, pixels).nodes);
+        EXPECT_NE(cutByView(model.nodes, by_error, pixels).nodes, cut.nodes);
+    }
+}
+
 /// What is left out of a visible cut must be out of sight, by each vertex of its patch.
 TEST(Cut, visibleCutLeavesOutOnlyWhatCannotBeSeen) {
     ToyTerrain model = makeToyTerrain();

@@ -91,14 +91,14 @@ void checkGroups(const Forest& forest, ForestReport& report) {
         const Node& first = forest.node(forest.members(g).front());
         for (const NodeIndex i : forest.members(g)) {
             const Node& node = forest.node(i);
-            if (node.error == first.error && sameSphere(node.saturated, first.saturated) &&
-                node.isLeaf() == first.isLeaf())
+            if (node.error == first.error && node.face_size == first.face_size &&
+                sameSphere(node.saturated, first.saturated) && node.isLeaf() == first.isLeaf())
                 continue;
             ++report.broken_groups;
             noteFault(
                 report.first_fault,
-                fmt::format("node {}: differs from node {} of its group {} in error, saturated "
-                            "sphere or in being a leaf",
+                fmt::format("node {}: differs from node {} of its group {} in error, face size, "
+                            "saturated sphere or in being a leaf",
                             i, forest.members(g).front(), node.group));
             break;
         }
@@ -111,6 +111,10 @@ void checkNode(const Forest& forest, NodeIndex i, ForestReport& report) {
     if (!(node.error >= 0) || !std::isfinite(node.error)) {
         ++report.not_monotone;
         noteFault(report.first_fault, fmt::format("node {}: error {}", i, node.error));
+    }
+    if (!(node.face_size >= 0) || !std::isfinite(node.face_size)) {
+        ++report.not_monotone;
+        noteFault(report.first_fault, fmt::format("node {}: face size {}", i, node.face_size));
     }
     if (!encloses(node.saturated, node.bounds)) {
         ++report.not_nested;
@@ -130,6 +134,11 @@ void checkNode(const Forest& forest, NodeIndex i, ForestReport& report) {
         ++report.not_monotone;
         noteFault(report.first_fault, fmt::format("node {}: error {} exceeds its parent's, {}", i,
                                                   node.error, parent.error));
+    }
+    if (!(node.face_size <= parent.face_size)) {
+        ++report.not_monotone;
+        noteFault(report.first_fault,
+                  fmt::format("node {}: its faces are larger than its parent's", i));
     }
     if (!encloses(parent.saturated, node.saturated)) {
         ++report.not_nested;

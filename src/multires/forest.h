@@ -21,8 +21,9 @@ struct ForestReport {
     uint64_t nodes = 0;
     uint64_t links = 0;      ///< pairs of parent and child
     uint64_t bad_links = 0;  ///< a child that does not exist, has two parents, or lies on a cycle
-    uint64_t broken_groups = 0;  ///< unequal error or sphere within, or leaves beside inner nodes
-    uint64_t not_monotone = 0;   ///< a child states a larger error than its parent
+    /// Unequal error, face size or sphere within, or leaves beside inner nodes.
+    uint64_t broken_groups = 0;
+    uint64_t not_monotone = 0;  ///< a child states a larger error or face size than its parent
     uint64_t not_nested = 0;  ///< `saturated` does not enclose own bounds or a child's `saturated`
     std::string first_fault;  ///< one sentence, empty if there is none
     bool ok() const { return first_fault.empty(); }

@@ -5,9 +5,9 @@
 // mesh) and two children, or a range of them, whose patches together replace it. Nodes of one
 // `group` (a diamond of Adaptive TetraPuzzles) are refined only together: they have equal `error`
 // and equal `saturated` sphere, so every criterion that depends on these two alone treats them
-// alike. Parents' errors are at least their children's, and parents' saturated spheres enclose
-// their children's, hence any criterion that is monotone in (error, sphere) selects a valid,
-// crack-free cut.
+// alike; likewise `face_size`. Parents' errors and face sizes are at least their children's, and
+// parents' saturated spheres enclose their children's, hence any criterion that is monotone in
+// (error or face size, sphere) selects a valid, crack-free cut.
 //
 // Parts that are refined independently of each other are joined where one is finer than the other
 // (docs/design/cluster.md): a *joint* is a child of the finer side's parent, and of the group of
@@ -35,7 +35,10 @@ struct Node {
     Sphere bounds;     ///< tight: encloses this node's patch
     Sphere saturated;  ///< encloses all geometry of the group and of everything finer below it
     float error = 0;   ///< proven two-sided distance to the input, monotone, the same in the group
-    NormalCone cone;   ///< of this patch's triangle normals
+    /// Square root of the mean area of its faces, as its method counts them, monotone, the same in
+    /// the group. 0: not known (ModelInfo::face_sizes).
+    float face_size = 0;
+    NormalCone cone;                          ///< of this patch's triangle normals
     NodeIndex child[2] = {kNoNode, kNoNode};  ///< kNoNode: none; a leaf and a joint have none
     uint32_t group = 0;                       ///< number of the diamond, unique in the model
     uint32_t page = 0;                        ///< which page holds the patch
@@ -75,6 +78,7 @@ struct ModelInfo {
     Box3i bounds;  ///< lattice units
     uint32_t levels = 0;
     uint64_t triangles_stored = 0;
+    bool face_sizes = false;  ///< nodes say how large their faces are
 };
 
 }  // namespace pietra

@@ -255,6 +255,9 @@ private:
         for (const NodeIndex i : forest.members(g)) {
             model_.nodes[i].error = float(error * (1 + 1e-6)) + settings_.quantisation_error;
             model_.nodes[i].saturated = sphere;
+            // Bisection halves areas, whatever the errors are.
+            model_.nodes[i].face_size =
+                float(size_ * settings_.spacing) * std::exp2f(-model_.nodes[i].level / 2.0f);
         }
     }
 

@@ -7,8 +7,10 @@
 
 namespace pietra {
 
-View::View(const Camera& camera, const PictureSize& size, const Lattice& lattice)
-    : size_(size), eye_(lattice.toLattice(camera.eye)) {
+View::View(const Camera& camera, const PictureSize& size, const Lattice& lattice, SelectBy select)
+    : size_(size),
+      eye_(lattice.toLattice(camera.eye)),
+      by_face_size_(select == SelectBy::kFaceSize) {
     back_ = glm::normalize(camera.eye - camera.target);
     Vec3d right = glm::cross(camera.up, back_);
     if (!(glm::dot(right, right) > 1e-24)) {  // looking along `up`: any other axis will do
@@ -42,7 +44,8 @@ bool View::outside(const Sphere& bounds) const {
 bool View::facesAway(const NormalCone& cone, const Sphere& bounds) const {
     if (cone.cos_angle <= 0) return false;
     // Away means dot(n, p - eye) > 0 for every n of the cone and every p of the sphere: the angle
-    // between the axis and the direction to the centre, plus both half-angles, stays below 90 degrees.
+    // between the axis and the direction to the centre, plus both half-angles, stays below 90
+    // degrees.
     const Vec3d to_centre = Vec3d(bounds.centre) - eye_;
     const double distance = glm::length(to_centre);
     if (distance <= bounds.radius) return false;

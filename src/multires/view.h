@@ -6,6 +6,7 @@
 
 #include "geometry/bounds.h"
 #include "geometry/lattice.h"
+#include "multires/node.h"
 
 namespace pietra {
 
@@ -24,10 +25,15 @@ struct PictureSize {
     bool operator==(const PictureSize&) const = default;
 };
 
+/// What a tolerance bounds: the error, or, as Wu and Huang (2014, section 6) have it, how large a
+/// face shows, whatever its error.
+enum class SelectBy { kError, kFaceSize };
+
 /// The camera in lattice coordinates, ready for tests and for drawing.
 class View {
 public:
-    View(const Camera& camera, const PictureSize& size, const Lattice& lattice);
+    View(const Camera& camera, const PictureSize& size, const Lattice& lattice,
+         SelectBy select = SelectBy::kError);
 
     const PictureSize& size() const { return size_; }
     const Vec3d& eye() const { return eye_; }  ///< lattice coordinates, real
@@ -41,6 +47,17 @@ public:
     /// No point within `error` of a point of the sphere moves in the image by more than this many
     /// pixels; infinite if the eye is inside the sphere.
     double errorInPixels(float error, const Sphere& saturated) const;
+    /// Of a node, what the tolerance bounds, in pixels. Of a face of mean area the side of a square
+    /// that is as large as it can show, wherever it is in the sphere and however it is turned.
+    double pixelsOf(const Node& node) const {
+        return errorInPixels(by_face_size_ ? node.face_size : node.error, node.saturated);
+    }
+    /// The same view, where what matters is where the surface lies.
+    View byError() const {
+        View view = *this;
+        view.by_face_size_ = false;
+        return view;
+    }
     /// The sphere lies wholly outside the picture.
     bool outside(const Sphere& bounds) const;
     /// Every triangle with a normal in `cone` within `bounds` faces away from the eye.
@@ -50,7 +67,8 @@ private:
     PictureSize size_;
     Vec3d eye_, right_, up_, back_;
     double focal_;
-    double error_scale_;  // focal / cos^2 of the picture's corner
+    bool by_face_size_;
+    double error_scale_;         // focal / cos^2 of the picture's corner
     std::array<Vec3d, 4> side_;  // inward unit normals of the frustum's sides, through the eye
 };
 

@@ -110,7 +110,7 @@ bool eyeMayBeInside(const ModelReader& model, const View& view) {
     if (!holds(closedPartsWithin(model.info(), model.nodes()), view.eye())) return false;
     EyeSide side(view.eye());
     std::mutex mutex;
-    visitPatches(model, cutByView(model.nodes(), view, kEyeSidePixels).nodes,
+    visitPatches(model, cutByView(model.nodes(), view.byError(), kEyeSidePixels).nodes,
                  [&](NodeIndex i, const Mesh& mesh) {
                      EyeSide part(view.eye());
                      part.add(model.nodes()[i], mesh);

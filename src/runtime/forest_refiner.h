@@ -114,7 +114,7 @@ void ForestRefiner::visit(const Sight& sight, Missed missed, const Draw& draw, c
             look(i);
             if (!residency_.resident(node.page) && sight.shows(node))
                 missing_.push_back({node.page, error_above});
-            const double error = sight.view.errorInPixels(node.error, node.saturated);
+            const double error = sight.view.pixelsOf(node);
             const bool refine = !node.isLeaf() && !(error <= sight.pixels);
             const bool is_open = refine && !covered && open(forest_.groupOf(i), sight);
             if (!is_open && !covered && sight.shows(node)) draw(i, error);

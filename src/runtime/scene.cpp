@@ -130,7 +130,7 @@ void Scene::Impl::select(const FrameRequest& request) {
     frame_.adapt_ms = 0;
     for (uint32_t i = 0; i < parts_.size(); ++i) {
         const Part& part = parts_[i];
-        const View view(request.camera, request.size, part.reader->info().lattice);
+        const View view = request.viewFrom(request.camera, part.reader->info());
         if (frame_.models.size() <= i) frame_.models.emplace_back(view);
         ModelFrame& out = frame_.models[i];
         out.view = view;
@@ -175,8 +175,7 @@ void Scene::Impl::prefetch(const FrameRequest& request) {
         patches_.prefetch(camera, request, pixels, next_level);
         for (const Part& part : parts_)
             if (part.is_live)
-                meshes_.pool().prefetch(part.index,
-                                        View(camera, request.size, part.reader->info().lattice),
+                meshes_.pool().prefetch(part.index, request.viewFrom(camera, part.reader->info()),
                                         pixels, next_level);
     }
     patches_.wantPrefetched();

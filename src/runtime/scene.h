@@ -43,7 +43,8 @@ size_t tableBytes(const ModelReader& model);
 struct FrameRequest {
     Camera camera;
     PictureSize size;
-    double pixels = 1;   ///< tolerance
+    double pixels = 1;                   ///< tolerance
+    SelectBy select = SelectBy::kError;  ///< what it bounds, of models that know both
     double seconds = 0;  ///< since the beginning, for the prediction of where the camera goes
     Culling culling{true, true, true, true};
     /// The last picture of all that is drawn: meshes that are adapted need not be as fine where it
@@ -52,10 +53,14 @@ struct FrameRequest {
     bool prefetch = true;
     bool show_error = false;  ///< DrawPatch::value is the error in pixels, not the level
 
+    View viewFrom(const Camera& from, const ModelInfo& model) const {
+        return {from, size, model.lattice, model.face_sizes ? select : SelectBy::kError};
+    }
     /// Asks for the same cut.
     bool sameView(const FrameRequest& other) const {
         return camera == other.camera && size == other.size && pixels == other.pixels &&
-               culling == other.culling && (seen != nullptr) == (other.seen != nullptr);
+               select == other.select && culling == other.culling &&
+               (seen != nullptr) == (other.seen != nullptr);
     }
 };
 

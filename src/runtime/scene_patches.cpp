@@ -59,7 +59,7 @@ void ScenePatches::prefetch(const Camera& camera, const FrameRequest& request, d
     for (uint32_t m = 0; m < models_.size(); ++m) {
         SceneModel& model = *models_[m];
         requests_.clear();
-        model.refiner.prefetch(View(camera, request.size, model.reader.info().lattice), pixels,
+        model.refiner.prefetch(request.viewFrom(camera, model.reader.info()), pixels,
                                request.culling, requests_);
         for (const PageRequest& r : requests_) ahead.push_back({m, r.page});
     }
@@ -96,7 +96,7 @@ bool ScenePatches::hasPagesForEye(uint32_t m, const View& view) {
     pages_for_eye_.clear();
     requests_.clear();
     model.refiner.visitDrawable(
-        view, kEyeSidePixels,
+        view.byError(), kEyeSidePixels,
         [&](NodeIndex i) {
             cut_for_eye_.push_back(i);
             pages_for_eye_.push_back(model.forest.node(i).page);
@@ -142,8 +142,7 @@ void ScenePatches::describe(const SceneModel& model, uint32_t m, bool show_error
         patch.patch = node.patch;
         patch.one_sided = node.closed && !out.two_sided;
         patch.id = i + m * 0x9e3779b9u;
-        patch.value = show_error ? float(out.view.errorInPixels(node.error, node.saturated))
-                                 : float(node.level);
+        patch.value = show_error ? float(out.view.pixelsOf(node)) : float(node.level);
         out.patches.push_back(patch);
     }
 }

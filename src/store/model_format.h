@@ -10,7 +10,9 @@
 namespace pietra {
 
 inline constexpr std::array<char, 8> kModelMagic = {'\x89', 'P', 'i', 'e', 't', 'r', 'a', '\n'};
-inline constexpr uint32_t kFormatVersion = 1;
+/// The second has face sizes in its node blocks and is the same otherwise: only models that have
+/// them are of it.
+inline constexpr uint32_t kPlainVersion = 1, kFaceSizesVersion = 2;
 inline constexpr uint32_t kEndianTag = 0x01020304;
 /// Header, directory and the coarsest levels fit into this many bytes where these levels do.
 inline constexpr uint64_t kFrontBytes = 1 << 20;
@@ -37,7 +39,7 @@ struct SectionEntry {
 
 struct FileHeader {
     std::array<char, 8> magic = kModelMagic;
-    uint32_t version = kFormatVersion;
+    uint32_t version = kPlainVersion;
     uint32_t endian = kEndianTag;
     uint32_t header_bytes = 0;
     uint32_t method_format = 0;        ///< version of what the method stores, its own business

@@ -49,6 +49,7 @@ ModelInfo infoFrom(const FileHeader& header) {
     info.quantisation_error = header.quantisation_error;
     info.levels = header.levels;
     info.triangles_stored = header.triangles_stored;
+    info.face_sizes = header.version == kFaceSizesVersion;
     return info;
 }
 
@@ -59,6 +60,7 @@ ModelReader::ModelReader(const std::string& path) : file_(path, File::Mode::kRea
     FileHeader header;
     readHeader(header);
     info_ = infoFrom(header);
+    format_version_ = header.version;
     identity_ = {header.source_hash, header.settings_hash, header.method_format};
     std::string fault;
     const std::vector<std::byte> attributes = readSection(header, SectionKind::kAttributes);
@@ -102,10 +104,10 @@ void ModelReader::readHeader(FileHeader& header) {
     if (got < sizeof header) fail(got, "the file ends early, within its header");
     if (header.endian != kEndianTag)
         fail(offsetof(FileHeader, endian), "the byte order is not little-endian");
-    if (header.version != kFormatVersion)
+    if (header.version < kPlainVersion || header.version > kFaceSizesVersion)
         fail(offsetof(FileHeader, version),
-             fmt::format("format version {} is unknown, this program reads version {}",
-                         header.version, kFormatVersion));
+             fmt::format("format version {} is unknown, this program reads versions {} to {}",
+                         header.version, kPlainVersion, kFaceSizesVersion));
     if (header.checksum != hashBytes(&header, offsetof(FileHeader, checksum)))
         fail(offsetof(FileHeader, checksum), "the header is damaged (checksum)");
     file_bytes_ = file_.size();
@@ -189,7 +191,7 @@ void ModelReader::readBlock(const BlockEntry& entry) {
         fail(entry.offset, "a block of nodes is damaged (checksum)");
     std::vector<PageRecord> records;
     std::string fault;
-    if (!decodeNodeBlock(bytes, entry, nodes_, records, fault))
+    if (!decodeNodeBlock(bytes, entry, info_.face_sizes, nodes_, records, fault))
         fail(entry.offset, fmt::format("a block of nodes is damaged: {}", fault));
 
     uint64_t offset = entry.pages_offset;
@@ -233,7 +235,7 @@ void ModelReader::checkNodes(const BlockEntry& entry) {
     }
 }
 
-/// Their groups' errors and spheres, which the file says once.
+/// Their groups' errors, spheres and face sizes, which the file says once.
 void ModelReader::fillJoints() {
     if (std::none_of(nodes_.begin(), nodes_.end(), [](const Node& n) { return n.is_joint; }))
         return;
@@ -246,8 +248,10 @@ void ModelReader::fillJoints() {
         const auto found = of_group.find(node.group);
         if (found == of_group.end())
             fail(0, fmt::format("a joint of group {}, which is not there", node.group));
-        node.error = nodes_[found->second].error;
-        node.saturated = nodes_[found->second].saturated;
+        const Node& mate = nodes_[found->second];
+        node.error = mate.error;
+        node.face_size = mate.face_size;
+        node.saturated = mate.saturated;
     }
 }
 

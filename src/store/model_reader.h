@@ -41,7 +41,7 @@ public:
     const std::string& path() const { return file_.path(); }
     const ModelInfo& info() const { return info_; }
     const ModelIdentity& identity() const { return identity_; }
-    uint32_t formatVersion() const { return kFormatVersion; }
+    uint32_t formatVersion() const { return format_version_; }
     uint64_t fileBytes() const { return file_bytes_; }
     PageSettings pageSettings() const;
     /// Pages hold patches: decode() and the like may be called. Else they are the method's own, as
@@ -81,6 +81,7 @@ private:
 
     File file_;
     uint64_t file_bytes_ = 0;
+    uint32_t format_version_ = 0;
     ModelInfo info_;
     ModelIdentity identity_;
     std::vector<Node> nodes_;

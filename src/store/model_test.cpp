@@ -53,6 +53,7 @@ struct Plan {
     uint32_t levels = 4;
     AttributeSchema schema;
     int columns = 5;
+    bool face_sizes = true;
     std::function<void(Node&, uint32_t index)> change;  ///< spoils nodes before they are written
     std::function<void(Mesh&, uint32_t index)> change_patch;
 };
@@ -69,6 +70,7 @@ Node describe(const Mesh& mesh, uint32_t level, uint32_t index, uint32_t levels)
     node.bounds = enclosing(mesh);
     node.saturated = {Vec3f(400000), 600000 + 1000 * float(levels - level)};
     node.error = 100 / float(1u << level);
+    node.face_size = 200 / float(1u << level);
     node.cone = {{0, 0, 1}, -1};
     node.group = (1u << level) + index / 2;
     node.triangles = uint32_t(mesh.triangleCount());
@@ -84,6 +86,7 @@ PageSettings settingsOf(const AttributeSchema& schema) {
 ModelInfo infoOf(const Plan& plan) {
     ModelInfo info;
     info.method = "tetra";
+    info.face_sizes = plan.face_sizes;
     info.lattice = {{1.5, -2e6, 3}, 0.125, 1};
     info.schema = plan.schema;
     info.input_triangles = 12345;
@@ -183,6 +186,7 @@ TEST_F(ModelTest, comesBackAsItWasWritten) {
         EXPECT_EQ(node.saturated.centre, was.saturated.centre);
         EXPECT_EQ(node.saturated.radius, was.saturated.radius);
         EXPECT_EQ(node.error, was.error);
+        EXPECT_EQ(node.face_size, was.face_size);
         EXPECT_EQ(node.group, was.group);
         EXPECT_EQ(node.triangles, was.triangles);
         EXPECT_EQ(node.vertices, was.vertices);
@@ -205,6 +209,19 @@ TEST_F(ModelTest, comesBackAsItWasWritten) {
         for (const Mesh& mesh : patches) triangles += mesh.triangleCount();
     }
     EXPECT_EQ(triangles, info.triangles_stored);
+}
+
+TEST_F(ModelTest, faceSizesAreInModelsThatHaveThemAlone) {
+    Plan plan;
+    for (const bool face_sizes : {true, false}) {
+        plan.face_sizes = face_sizes;
+        writeModel(pathTo("a.pietra"), directory(), plan, true);
+        const ModelReader reader(pathTo("a.pietra"));
+        EXPECT_EQ(reader.info().face_sizes, face_sizes);
+        EXPECT_EQ(reader.formatVersion(), face_sizes ? 2u : 1u);
+        EXPECT_EQ(reader.nodes()[0].face_size, face_sizes ? 200 : 0);
+        EXPECT_TRUE(verify(pathTo("a.pietra")).ok());
+    }
 }
 
 TEST_F(ModelTest, sameBytesEachTimeAndForAnyPath) {
@@ -240,6 +257,7 @@ TEST_F(ModelTest, nodesTakeFewBytes) {
         node.saturated = i % 4 ? nodes.back().saturated
                                : Sphere{centre + Vec3f(0.3f), node.bounds.radius * 1.37f};
         node.error = i % 4 ? nodes.back().error : float(random()) * 0x1p-32f;
+        node.face_size = i % 4 ? nodes.back().face_size : float(random()) * 0x1p-32f;
         node.cone = {glm::normalize(centre), float(below(random, 1000)) / 1000};
         node.child[0] = 5000 + 2 * i;
         node.child[1] = 5001 + 2 * i;
@@ -248,8 +266,8 @@ TEST_F(ModelTest, nodesTakeFewBytes) {
         nodes.push_back(node);
     }
     const std::vector<PageRecord> pages(512, PageRecord{0x123456789abcdef0, 20000, 4});
-    const Bytes bytes = encodeNodeBlock(nodes, pages);
-    EXPECT_LT(double(bytes.size()) / double(nodes.size()), 40);
+    EXPECT_LT(double(encodeNodeBlock(nodes, pages, false).size()) / double(nodes.size()), 40);
+    EXPECT_LT(double(encodeNodeBlock(nodes, pages, true).size()) / double(nodes.size()), 41);
 }
 
 TEST_F(ModelTest, conesOnlyWiden) {
@@ -425,8 +443,8 @@ TEST_F(ModelTest, foreignHeadersAreExplained) {
     writeModel(pathTo("a.pietra"), directory(), {});
     const Bytes bytes = load(pathTo("a.pietra"));
     const std::string p = pathTo("b.pietra");
-    EXPECT_EQ(messageWithHeader(p, bytes, offsetof(FileHeader, version), 2),
-              p + ": byte 8: format version 2 is unknown, this program reads version 1");
+    EXPECT_EQ(messageWithHeader(p, bytes, offsetof(FileHeader, version), 3),
+              p + ": byte 8: format version 3 is unknown, this program reads versions 1 to 2");
     EXPECT_EQ(messageWithHeader(p, bytes, offsetof(FileHeader, endian), 0x04030201),
               p + ": byte 12: the byte order is not little-endian");
     EXPECT_EQ(messageWithHeader(p, bytes, offsetof(FileHeader, shift), 31),
@@ -466,13 +484,21 @@ TEST_F(ModelTest, verifyFindsWhatIsWrongWithNodes) {
          [](Node& n, uint32_t i) {
              if (i == 5 || i == 6) n.saturated.radius += 1500;
          }},
-        {"node 2 has an error below that of a child",
+        {"node 2 has an error or a face size below that of a child",
          [](Node& n, uint32_t i) {
              if (i == 5 || i == 6) n.error = 60;
          }},
-        {"node 6 differs in error or saturated sphere from others of its group",
+        {"node 2 has an error or a face size below that of a child",
+         [](Node& n, uint32_t i) {
+             if (i == 5 || i == 6) n.face_size = 101;
+         }},
+        {"node 6 differs in error, face size or saturated sphere from others of its group",
          [](Node& n, uint32_t i) {
              if (i == 6) n.error *= 0.99f;
+         }},
+        {"node 6 differs in error, face size or saturated sphere from others of its group",
+         [](Node& n, uint32_t i) {
+             if (i == 6) n.face_size *= 0.99f;
          }},
         {"node 6 has triangles whose normals lie outside of its cone",
          [](Node& n, uint32_t i) {
@@ -536,30 +562,35 @@ TEST_F(ModelTest, verifyCountsAreTheSameForAnyNumberOfThreads) {
 TEST_F(ModelTest, damageBehindGoodChecksumsIsRejected) {
     Random random(15);
     std::vector<Node> nodes(20);
-    for (Node& node : nodes) node.triangles = below(random, 1000);
-    const std::vector<PageRecord> pages(5, PageRecord{1, 2, 4});
-    const Bytes block = encodeNodeBlock(nodes, pages);
-    const BlockEntry entry{0, 0, 0, 0, uint32_t(block.size()), 0, 0, 20, 0, 5};
-    const auto decodes = [&](std::span<const std::byte> damaged, const BlockEntry& e) {
-        std::vector<Node> out;
-        std::vector<PageRecord> records;
-        std::string fault;
-        const Bytes exact(damaged.begin(), damaged.end());
-        const bool good = decodeNodeBlock(exact, e, out, records, fault);
-        EXPECT_NE(good, !fault.empty());
-        return good;
-    };
-    EXPECT_TRUE(decodes(block, entry));
-    for (size_t length = 0; length < block.size(); ++length)
-        EXPECT_FALSE(decodes(std::span(block).first(length), entry));
-    for (int i = 0; i < 3000; ++i) {
-        Bytes flipped = block;
-        flipped[below(random, uint32_t(block.size()))] ^= std::byte(1u << below(random, 8));
-        decodes(flipped, entry);
+    for (Node& node : nodes) {
+        node.triangles = below(random, 1000);
+        node.face_size = float(below(random, 1000));
     }
-    BlockEntry more = entry;
-    more.node_count = 21;
-    EXPECT_FALSE(decodes(block, more));
+    const std::vector<PageRecord> pages(5, PageRecord{1, 2, 4});
+    for (const bool face_sizes : {false, true}) {
+        const Bytes block = encodeNodeBlock(nodes, pages, face_sizes);
+        const BlockEntry entry{0, 0, 0, 0, uint32_t(block.size()), 0, 0, 20, 0, 5};
+        const auto decodes = [&](std::span<const std::byte> damaged, const BlockEntry& e) {
+            std::vector<Node> out;
+            std::vector<PageRecord> records;
+            std::string fault;
+            const Bytes exact(damaged.begin(), damaged.end());
+            const bool good = decodeNodeBlock(exact, e, face_sizes, out, records, fault);
+            EXPECT_NE(good, !fault.empty());
+            return good;
+        };
+        EXPECT_TRUE(decodes(block, entry));
+        for (size_t length = 0; length < block.size(); ++length)
+            EXPECT_FALSE(decodes(std::span(block).first(length), entry));
+        for (int i = 0; i < 3000; ++i) {
+            Bytes flipped = block;
+            flipped[below(random, uint32_t(block.size()))] ^= std::byte(1u << below(random, 8));
+            decodes(flipped, entry);
+        }
+        BlockEntry more = entry;
+        more.node_count = 21;
+        EXPECT_FALSE(decodes(block, more));
+    }
 }
 
 }  // namespace

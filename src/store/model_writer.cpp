@@ -109,7 +109,7 @@ void ModelWriter::numberLevels(std::vector<BlockEntry>& directory) {
         }
 }
 
-void ModelWriter::writeBlocks(const Level& level, std::span<BlockEntry> blocks) {
+void ModelWriter::writeBlocks(const Level& level, std::span<BlockEntry> blocks, bool face_sizes) {
     uint64_t offset = level.nodes_offset;
     const uint32_t finer = blocks[0].first_node + level.nodes;  // the next level's first node
     std::vector<Node> nodes;
@@ -128,7 +128,7 @@ void ModelWriter::writeBlocks(const Level& level, std::span<BlockEntry> blocks) 
         for (Node& node : nodes)
             for (NodeIndex& child : node.child)
                 if (child != kNoNode) child += finer;
-        const std::vector<std::byte> bytes = encodeNodeBlock(nodes, pages);
+        const std::vector<std::byte> bytes = encodeNodeBlock(nodes, pages, face_sizes);
         block.offset = position_;
         block.bytes = uint32_t(bytes.size());
         block.checksum = hashBytes(bytes.data(), bytes.size());
@@ -168,6 +168,7 @@ void ModelWriter::writeHeader(const ModelInfo& info, const ModelIdentity& identi
                               std::span<const std::byte> attributes,
                               std::span<const std::byte> method_section) {
     FileHeader header;
+    header.version = info.face_sizes ? kFaceSizesVersion : kPlainVersion;
     header.header_bytes = sizeof header;
     header.method_format = identity.method_format;
     CHECK_LT(info.method.size(), header.method.size());
@@ -233,10 +234,10 @@ void ModelWriter::finish(const ModelInfo& info, const ModelIdentity& identity,
     const auto levelAt = [&](size_t i) -> const Level& { return levels_[count - 1 - i]; };
     size_t front = 0;
     for (; front < count && fitsFront(levelAt(front)); ++front) {
-        writeBlocks(levelAt(front), blocks[front]);
+        writeBlocks(levelAt(front), blocks[front], info.face_sizes);
         writePages(levelAt(front), blocks[front]);
     }
-    for (size_t i = front; i < count; ++i) writeBlocks(levelAt(i), blocks[i]);
+    for (size_t i = front; i < count; ++i) writeBlocks(levelAt(i), blocks[i], info.face_sizes);
     for (size_t i = front; i < count; ++i) writePages(levelAt(i), blocks[i]);
     writeHeader(info, identity, directory, attributes, method_section);
     output_.commit();

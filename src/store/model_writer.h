@@ -79,7 +79,7 @@ private:
     };
 
     void numberLevels(std::vector<BlockEntry>& directory);
-    void writeBlocks(const Level& level, std::span<BlockEntry> blocks);
+    void writeBlocks(const Level& level, std::span<BlockEntry> blocks, bool face_sizes);
     void writePages(const Level& level, std::span<BlockEntry> blocks);
     void writeHeader(const ModelInfo& info, const ModelIdentity& identity,
                      std::span<const BlockEntry> directory, std::span<const std::byte> attributes,

@@ -36,8 +36,12 @@ enum Column : size_t {
     kGroup,
     kSaturated,  // x, y, z, radius
     kError = kSaturated + 4,
+    kFaceSize,  // only where nodes know it
     kColumns
 };
+constexpr size_t columnCount(bool face_sizes) {
+    return face_sizes ? kColumns : kFaceSize;
+}
 constexpr size_t kFirstNodeColumn = kFlags;
 constexpr size_t kFirstGroupColumn = kGroup;
 
@@ -88,6 +92,7 @@ uint32_t bitsOf(float value) {
 
 bool sameRefinement(const Node& a, const Node& b) {
     return a.group == b.group && bitsOf(a.error) == bitsOf(b.error) &&
+           bitsOf(a.face_size) == bitsOf(b.face_size) &&
            bitsOf(a.saturated.radius) == bitsOf(b.saturated.radius) &&
            bitsOf(a.saturated.centre.x) == bitsOf(b.saturated.centre.x) &&
            bitsOf(a.saturated.centre.y) == bitsOf(b.saturated.centre.y) &&
@@ -145,15 +150,15 @@ private:
 
 /// Reads the columns, whose lengths only the block's counts and the column of group references
 /// tell.
-bool readColumns(std::span<const std::byte> bytes, const BlockEntry& entry,
+bool readColumns(std::span<const std::byte> bytes, const BlockEntry& entry, size_t column_count,
                  std::array<std::vector<uint32_t>, kColumns>& columns, std::string& fault) {
     ByteReader reader(bytes);
     const uint32_t group_rows = reader.varintUpTo(entry.node_count);
     std::array<uint8_t, kColumns> planes{};
     size_t streams = 0;
-    for (uint8_t& count : planes) {
-        count = reader.fixed<uint8_t>();
-        streams += std::min<size_t>(count, 4);
+    for (size_t c = 0; c < column_count; ++c) {
+        planes[c] = reader.fixed<uint8_t>();
+        streams += std::min<size_t>(planes[c], 4);
     }
     if (!reader.ok() || std::ranges::any_of(planes, [](uint8_t count) { return count > 4; })) {
         fault = "its columns are damaged";
@@ -190,7 +195,7 @@ NormalCone storedCone(const NormalCone& cone) {
 }
 
 std::vector<std::byte> encodeNodeBlock(std::span<const Node> nodes,
-                                       std::span<const PageRecord> pages) {
+                                       std::span<const PageRecord> pages, bool face_sizes) {
     std::array<std::vector<uint32_t>, kColumns> columns;
     for (const PageRecord& page : pages) {
         columns[kPageBytes].push_back(page.bytes);
@@ -221,7 +226,7 @@ std::vector<std::byte> encodeNodeBlock(std::span<const Node> nodes,
         if (node.is_joint) {  // the group says the rest
             columns[kGroupBack].push_back(0);
             delta.put(kGroup, node.group);
-            delta.repeat(kSaturated, 5);
+            delta.repeat(kSaturated, kColumns - kSaturated);
             continue;
         }
         const auto last = last_of_group.find(node.group);
@@ -233,22 +238,23 @@ std::vector<std::byte> encodeNodeBlock(std::span<const Node> nodes,
         delta.put(kGroup, node.group);
         delta.putSphere(kSaturated, node.saturated);
         delta.put(kError, bitsOf(node.error));
+        delta.put(kFaceSize, bitsOf(node.face_size));
     }
     std::vector<std::byte> bytes;
     ByteWriter writer(bytes);
     writer.varint(columns[kGroup].size());
     StreamPacker packer;
     std::vector<uint8_t> planes;
-    for (const std::vector<uint32_t>& column : columns) packColumn(column, packer, planes);
+    for (size_t c = 0; c < columnCount(face_sizes); ++c) packColumn(columns[c], packer, planes);
     writer.raw(planes.data(), planes.size());
     packer.write(writer);
     return bytes;
 }
 
-bool decodeNodeBlock(std::span<const std::byte> bytes, const BlockEntry& entry,
+bool decodeNodeBlock(std::span<const std::byte> bytes, const BlockEntry& entry, bool face_sizes,
                      std::vector<Node>& nodes, std::vector<PageRecord>& pages, std::string& fault) {
     std::array<std::vector<uint32_t>, kColumns> columns;
-    if (!readColumns(bytes, entry, columns, fault)) return false;
+    if (!readColumns(bytes, entry, columnCount(face_sizes), columns, fault)) return false;
     uint64_t paged = 0;
     for (uint32_t p = 0; p < entry.page_count; ++p) {
         pages.push_back({columns[kChecksumLow][p] | uint64_t(columns[kChecksumHigh][p]) << 32,
@@ -288,10 +294,12 @@ bool decodeNodeBlock(std::span<const std::byte> bytes, const BlockEntry& entry,
             node.group = mate.group;
             node.saturated = mate.saturated;
             node.error = mate.error;
+            node.face_size = mate.face_size;
         } else {
             node.group = delta.get(kGroup, group_row);
             node.saturated = delta.getSphere(kSaturated, group_row);
             node.error = delta.getFloat(kError, group_row);
+            if (face_sizes) node.face_size = delta.getFloat(kFaceSize, group_row);
             ++group_row;
         }
         nodes.push_back(node);

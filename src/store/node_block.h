@@ -21,17 +21,17 @@ struct PageRecord {
     uint32_t node_count = 0;  ///< its nodes follow those of the page before
 };
 
-/// `nodes` carry global child indices; their page, patch and level are not stored: they follow from
-/// the order.
+/// `face_sizes`: whether the block has them (ModelInfo). `nodes` carry global child indices; their
+/// page, patch and level are not stored: they follow from the order.
 std::vector<std::byte> encodeNodeBlock(std::span<const Node> nodes,
-                                       std::span<const PageRecord> pages);
+                                       std::span<const PageRecord> pages, bool face_sizes);
 
 /// Appends entry.node_count nodes and entry.page_count pages, or returns false with a sentence in
 /// `fault`. Untrusted bytes: never throws; the numbers are those of the file, not yet checked for
 /// sense (children, counts), but floats are finite and each node has a page.
 [[nodiscard]] bool decodeNodeBlock(std::span<const std::byte> bytes, const BlockEntry& entry,
-                                   std::vector<Node>& nodes, std::vector<PageRecord>& pages,
-                                   std::string& fault);
+                                   bool face_sizes, std::vector<Node>& nodes,
+                                   std::vector<PageRecord>& pages, std::string& fault);
 
 /// The cone as it is stored: every normal within `cone` is within the result.
 NormalCone storedCone(const NormalCone& cone);

@@ -52,6 +52,7 @@ inline void writeTerrainModel(const ToyTerrain& terrain, const std::string& path
         terrain_model::writeLevel(terrain, uint32_t(level), levels[level], place, writer);
     ModelInfo info;
     info.method = "toy";
+    info.face_sizes = true;
     info.lattice = {origin, 0.01, 0};
     info.quantisation_error = ToyTerrainSettings{}.quantisation_error;
     for (const Mesh& mesh : terrain.patches)

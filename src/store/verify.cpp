@@ -61,8 +61,8 @@ bool mayBeClosed(const Mesh& patch) {
 }
 
 bool sameRefinement(const Node& a, const Node& b) {
-    return a.error == b.error && a.saturated.centre == b.saturated.centre &&
-           a.saturated.radius == b.saturated.radius;
+    return a.error == b.error && a.face_size == b.face_size &&
+           a.saturated.centre == b.saturated.centre && a.saturated.radius == b.saturated.radius;
 }
 
 /// What was found wrong with a node, as bits.
@@ -82,8 +82,8 @@ constexpr std::array<std::pair<Finding, const char*>, 8> kFindingTexts = {{
     {kPatchOutside, "has vertices outside of its bounds"},
     {kBoundsOutside, "has bounds that stick out of its saturated sphere"},
     {kChildOutside, "has a child whose saturated sphere sticks out of its own"},
-    {kErrorBelowChild, "has an error below that of a child"},
-    {kGroupDiffers, "differs in error or saturated sphere from others of its group"},
+    {kErrorBelowChild, "has an error or a face size below that of a child"},
+    {kGroupDiffers, "differs in error, face size or saturated sphere from others of its group"},
     {kConeTooNarrow, "has triangles whose normals lie outside of its cone"},
     {kFalselyClosed, "says that it is closed, but has a border, a fold or a triangle turned over"},
 }};
@@ -105,9 +105,11 @@ void checkSaturation(std::span<const Node> nodes, std::vector<uint8_t>& found) {
                 const Node& child = nodes[c];
                 if (!holds(node.saturated, child.is_joint ? child.bounds : child.saturated))
                     found[i] |= kChildOutside;
-                if (!child.is_joint && !(node.error >= child.error)) found[i] |= kErrorBelowChild;
+                const bool monotone =
+                    node.error >= child.error && node.face_size >= child.face_size;
+                if (!child.is_joint && !monotone) found[i] |= kErrorBelowChild;
             });
-            if (!(node.error >= 0)) found[i] |= kErrorBelowChild;
+            if (!(node.error >= 0) || !(node.face_size >= 0)) found[i] |= kErrorBelowChild;
         }
     });
 }

@@ -466,6 +466,7 @@ void Viewer::drawScene() {
     request.camera = frozen_camera_;
     request.size = size;
     request.pixels = state_.pixels * motion_factor_;
+    request.select = settings_.select;
     request.seconds = running_.seconds();
     request.prefetch = state_.prefetch;
     request.show_error = state_.show == Show::kError;

@@ -23,7 +23,8 @@ enum class ViewerRenderer { kAuto, kCpu, kGl };
 struct ViewerSettings {
     PictureSize size{1280, 800};
     double pixels = 1;
-    SceneSettings scene;  ///< without a sink
+    SelectBy select = SelectBy::kError;  ///< as FrameRequest has it
+    SceneSettings scene;                 ///< without a sink
     ViewerRenderer renderer = ViewerRenderer::kAuto;
     size_t vram_bytes = size_t(1) << 30;           ///< for OpenGL
     std::function<void(const std::string&)> tell;  ///< takes notices; may be empty

@@ -226,6 +226,30 @@ class Shown(VerbTest):
                              "8", "--size", "200x160", "--report", "-")
         self.assertTrue(any(frame["operations"] > 0 for frame in flight["frames"]))
 
+    def test_face_clusters_are_selected_by_area(self):
+        self.report("build", "statue.ply", "-o", "faces.pietra", "--method", "cluster", "--report",
+                    "-", "--force")
+        self.assertEqual(self.report("check", "faces.pietra", "--json")["ok"], True)
+        drawn = [self.render(f"{pixels}.png", "--select", "area", "--pixels", str(pixels),
+                             "--cull", "none", models=("faces.pietra",))
+                 for pixels in (1, 4, 16, 64)]
+        triangles = [picture["triangles"] for picture in drawn]
+        self.assertEqual(triangles, sorted(triangles, reverse=True))
+        self.assertGreater(triangles[1], 4 * triangles[3])
+        # Two pictures of 4 x 4 pixels a face or less, whatever they show.
+        self.assertGreater(triangles[1], drawn[1]["pixels_covered"] / 16)
+        by_error = self.render("error.png", "--pixels", "4", "--cull", "none",
+                               models=("faces.pietra",))
+        self.assertLess(by_error["triangles"], triangles[1])
+        flight = self.report("bench", "faces.pietra", "--path", "orbit", "--frames", "4", "--size",
+                             "200x160", "--pixels", "4", "--select", "area", "--report", "-")
+        self.assertEqual(flight["select"], "area")
+        for verb in (["render", "-o", "x.png"], ["bench", "--path", "orbit", "--frames", "4"]):
+            run = self.run_pietra(verb[0], "faces.pietra", "statue.pietra", *verb[1:], "--select",
+                                  "area")
+            self.assertEqual(run.returncode, 2)
+            self.assertIn("statue.pietra: does not say how large its faces are", run.stderr)
+
     def render(self, name, *arguments, models=("statue.pietra",)):
         return self.report("render", *models, "-o", name, "--size", "200x160", "--report", "-",
                            *arguments)

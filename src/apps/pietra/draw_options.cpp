@@ -16,6 +16,21 @@ Culling CullOption::culling() const {
     return {all || word_ == "frustum", all || word_ == "cone", all, all || word_ == "occlusion"};
 }
 
+void SelectOption::declare(OptionSet& options) {
+    options.choice("--select", word_, {"error", "area"},
+                   "What --pixels bounds: how far the error may show; or, for models of the method "
+                   "cluster, how large faces may, in the mean: an area of at most the square of "
+                   "so many pixels, whatever the error.");
+}
+
+SelectBy SelectOption::selectBy(std::span<const ModelReader* const> models) const {
+    for (const ModelReader* model : models)
+        if (selectBy() == SelectBy::kFaceSize && !model->info().face_sizes)
+            throw UsageError(fmt::format("--select area: {}: does not say how large its faces are",
+                                         model->path()));
+    return selectBy();
+}
+
 void declareVram(OptionSet& options, uint64_t& bytes) {
     options.size("--vram", bytes,
                  "Most graphics memory for what is loaded, with --renderer gl: what is drawn must "

@@ -1,12 +1,14 @@
 #pragma once
 // Options of the verbs that draw.
 
+#include <span>
 #include <string>
 
 #include "apps/pietra/verb.h"
 #include "base/error.h"
 #include "gpu/context.h"
 #include "multires/cut.h"
+#include "store/model_reader.h"
 
 namespace pietra {
 
@@ -18,6 +20,19 @@ public:
 
 private:
     std::string word_ = "all";
+};
+
+/// --select: what the tolerance bounds.
+class SelectOption {
+public:
+    void declare(OptionSet& options);
+    SelectBy selectBy() const { return word_ == "area" ? SelectBy::kFaceSize : SelectBy::kError; }
+    /// Throws UsageError for a model that does not know it.
+    SelectBy selectBy(std::span<const ModelReader* const> models) const;
+    const std::string& word() const { return word_; }
+
+private:
+    std::string word_ = "error";
 };
 
 /// --vram.

@@ -81,6 +81,7 @@ private:
         request.camera = path_.frame(i, settings_.frames);
         request.size = settings_.size;
         request.pixels = settings_.pixels;
+        request.select = settings_.select;
         request.seconds = timeOf(i);
         request.culling = settings_.culling;
         request.prefetch = settings_.prefetch;
@@ -214,9 +215,10 @@ private:
     std::unique_ptr<LiveRenderer> renderer_;  // null: nothing is drawn
     // Whether what pictures hide is told to the scene. One model hides little of itself (README of
     // pmesh); and pictures of several samples have no one depth.
-    const bool looks_ = models_.size() > 1 && settings_.draw != Draw::kNothing &&
-                        settings_.culling.occlusion && settings_.samples == 1;
-    SeenDepth seen_;  // of the last picture
+    const bool looks_ =
+        models_.size() > 1 &&
+        settings_.draw != Draw::kNothing&& settings_.culling.occlusion&& settings_.samples == 1;
+    SeenDepth seen_;   // of the last picture
     SeenDepth asked_;  // of the picture that a frame is compared by
     Scene scene_;
     uint64_t bytes_read_ = 0;

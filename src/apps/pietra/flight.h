@@ -15,6 +15,7 @@ struct FlightSettings {
     int frames = 0;  ///< at least 1
     PictureSize size;
     double pixels = 1;
+    SelectBy select = SelectBy::kError;
     Culling culling{true, true, true, true};
     bool prefetch = true;
     int samples = 1;
@@ -32,7 +33,7 @@ struct FrameRecord {
     double seconds = 0;  ///< on the path
     double ms = 0, select_ms = 0, load_ms = 0, draw_ms = 0;
     double adapt_ms = 0;  ///< of select_ms: meshes that are adapted
-    double gpu_ms = 0;  ///< by the GPU's own clock; 0: not known
+    double gpu_ms = 0;    ///< by the GPU's own clock; 0: not known
     /// To draw this view again with everything resident, and nothing else to do; 0: not measured.
     double static_ms = 0;
     uint64_t triangles = 0, patches = 0;

@@ -40,7 +40,7 @@ public:
 
 private:
     CameraPath path(const ModelFiles& files) const;
-    FlightSettings settings(const CameraPath& path) const;
+    FlightSettings settings(const ModelFiles& files, const CameraPath& path) const;
     void dropCaches() const;
     FlightRecord flyOnce(const ModelFiles& files, const CameraPath& path,
                          const FlightSettings& settings, const char* stage,
@@ -55,6 +55,7 @@ private:
     double pixels_ = 1;
     std::string renderer_ = "cpu";
     std::string samples_ = "1";
+    SelectOption select_;
     CullOption cull_;
     std::string prefetch_ = "on";
     uint64_t ram_ = uint64_t(1) << 30, vram_ = uint64_t(1) << 30;
@@ -102,6 +103,7 @@ void BenchVerb::declare(OptionSet& options) {
         .defaultsTo("60 a second");
     options.pictureSize("--size", size_, "Of the picture, in pixels.");
     options.number("--pixels", "T", pixels_, {.min = 0}, "Tolerance in pixels.");
+    select_.declare(options);
     options.choice("--renderer", renderer_, {"cpu", "gl", "none"}, "What draws.");
     options.choice("--samples", samples_, {"1", "4"}, "Coverage samples a pixel.");
     cull_.declare(options, "What is left out, as for render.");
@@ -123,12 +125,13 @@ CameraPath BenchVerb::path(const ModelFiles& files) const {
     return readCameraPath(path_, upVector(camera_.up()));
 }
 
-FlightSettings BenchVerb::settings(const CameraPath& path) const {
+FlightSettings BenchVerb::settings(const ModelFiles& files, const CameraPath& path) const {
     FlightSettings settings;
     settings.frames =
         frames_ ? int(*frames_) : 1 + int(std::lround(path.seconds * kFramesPerSecond));
     settings.size = size_;
     settings.pixels = pixels_;
+    settings.select = select_.selectBy(files.views());
     settings.culling = cull_.culling();
     settings.prefetch = prefetch_ == "on";
     settings.samples = samples_ == "4" ? 4 : 1;
@@ -172,6 +175,7 @@ Json BenchVerb::report(const BenchRecord& record, const CameraPath& path, bool p
         {"renderer", renderer_},
         {"size", {size_.width, size_.height}},
         {"pixels", pixels_},
+        {"select", select_.word()},
         {"errors_proven", proven},
         {"about", fmt::format("{}, {}x{}, {} px, {} samples, {} for pages, {}{}; {}", path_,
                               size_.width, size_.height, pixels_, samples_, formatBytes(ram_),
@@ -221,7 +225,7 @@ int BenchVerb::run(const RunContext& context) {
     if (cold_) dropCaches();
     const ModelFiles files(files_);
     const CameraPath camera_path = path(files);
-    FlightSettings flight = settings(camera_path);
+    FlightSettings flight = settings(files, camera_path);
     flight.gl_messages = glMessages(context.common);
     const bool variants = !html_.empty() && flight.compare;
     context.progress.setStages(variants ? 3 : 1);

@@ -59,6 +59,7 @@ private:
     std::optional<std::pair<double, double>> range_;
     std::string renderer_ = "cpu";
     std::string samples_ = "1";
+    SelectOption select_;
     CullOption cull_;
     bool two_sided_ = false;
     Vec3d light_ = ShadeSettings{}.light_direction;
@@ -105,6 +106,7 @@ void RenderVerb::declare(OptionSet& options) {
     camera_.declare(options);
     options.number("--pixels", "T", pixels_, {.min = 0},
                    "Tolerance in pixels; 0 draws the full mesh.");
+    select_.declare(options);
     options.custom("--show", "WHAT", "shaded", "What the colours mean, see above.",
                    [this](const std::string& word) { parseShow(word); });
     options.custom("--range", "MIN:MAX", "those of the coarsest cut",
@@ -177,6 +179,7 @@ void RenderVerb::showScalar(const ModelFiles& files, ShadeSettings& shade) const
 OfflineSettings RenderVerb::settings(const ModelFiles& files) const {
     OfflineSettings settings;
     settings.pixels = pixels_;
+    settings.select = select_.selectBy(files.views());
     settings.culling = cull_.culling();
     settings.culling.cone &= !two_sided_;
     settings.renderer = renderer_ == "gl" ? DrawWith::kGl : DrawWith::kCpu;

@@ -29,6 +29,7 @@ private:
     std::vector<std::string> files_;
     PictureSize size_{1280, 800};
     double pixels_ = 1;
+    SelectOption select_;
     std::string renderer_ = "auto";
     std::string up_ = "auto";
     std::string script_;
@@ -56,6 +57,7 @@ void ViewVerb::declare(OptionSet& options) {
     options.files("FILE", files_, "Models, or meshes.").require();
     options.pictureSize("--size", size_, "Of the window, in pixels.");
     options.number("--pixels", "T", pixels_, {.min = 0.25, .max = 64}, "Tolerance in pixels.");
+    select_.declare(options);
     options.choice("--renderer", renderer_, {"auto", "gl", "cpu"},
                    "What draws; auto: OpenGL where a graphics card does it, else the processor.");
     options.choice("--up", up_, {"auto", "y", "z"},
@@ -78,6 +80,7 @@ int ViewVerb::run(const RunContext& context) {
     ViewerSettings settings;
     settings.size = size_;
     settings.pixels = pixels_;
+    settings.select = select_.selectBy();
     if (up_ != "auto") settings.up = up_ == "y" ? UpAxis::kY : UpAxis::kZ;
     settings.scene.ram_bytes = size_t(ram_);
     settings.scene.open_live = openLive;

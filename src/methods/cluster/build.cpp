@@ -25,7 +25,9 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
     report.nodes = work.writer.nodeCount();
 
     progress.beginStage("write", 0);
-    work.writer.finish(work.info());
+    ModelInfo info = work.info();
+    info.face_sizes = true;
+    work.writer.finish(info);
     progress.endStage();
     work.finish(report);
     return report;

@@ -1,6 +1,7 @@
 #include "methods/cluster/layer_builder.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <unordered_map>
 #include <unordered_set>
@@ -68,6 +69,13 @@ Node describe(const Mesh& mesh, bool closed, Worker& worker) {
     }
     node.cone = enclosingCone(worker.normals);
     return node;
+}
+
+/// The square root of a face's mean area.
+float faceSize(const PolygonMesh& polygons) {
+    double area = 0;
+    for (const FaceShape& shape : polygons.shape) area += shape.area;
+    return polygons.faceCount() == 0 ? 0 : float(std::sqrt(area / polygons.faceCount()));
 }
 
 /// Lattice points of a cell's cube that are nobody's vertices.
@@ -274,6 +282,7 @@ Node Builder::leafNode(const CellStep& step, const CellLayer& layer, Worker& wor
     Node node = describe(layer.triangles.mesh, layer.closed, worker);
     node.saturated = node.bounds;
     node.error = layer.error;
+    node.face_size = faceSize(layer.polygons);
     node.group = uint32_t(octree_.leafNumber(step.cell));
     return node;
 }
@@ -422,9 +431,11 @@ void Builder::runStep(size_t index, UnitResult& result, std::vector<Mesh>& patch
     CellLayer base = load(step, worker, &below);
     const NodeIndex first = NodeIndex(result.nodes.size());
     std::vector<Sphere> spheres;
+    float face_size = 0;
     for (const CellId cell : step.below) {
         result.nodes.push_back(isFirst(step) ? leafNode(step, base, worker) : below_.at(cell).node);
         spheres.push_back(result.nodes.back().saturated);
+        face_size = std::max(face_size, result.nodes.back().face_size);
     }
     const float error = base.error;
     addJoints(step, base, result, joints, spheres, worker);
@@ -457,6 +468,7 @@ void Builder::runStep(size_t index, UnitResult& result, std::vector<Mesh>& patch
     spheres.push_back(node.bounds);
     node.saturated = enclosingBall(spheres);
     node.error = layer.error;
+    node.face_size = std::max(face_size, faceSize(layer.polygons));
     node.group = groups_ + uint32_t(index);
     node.child_range = true;
     node.child[0] = first;

@@ -35,9 +35,7 @@ struct SceneModel {
     Cut cut;
 
     const Node& node(NodeIndex i) const { return reader->nodes()[i]; }
-    double errorInPixels(NodeIndex i) const {
-        return view.errorInPixels(node(i).error, node(i).saturated);
-    }
+    double pixelsOf(NodeIndex i) const { return view.pixelsOf(node(i)); }
 };
 
 class OfflineRenderer {
@@ -46,7 +44,8 @@ public:
                     const PictureSize& size, const OfflineSettings& settings, Progress& progress)
         : settings_(settings), size_(size), progress_(progress) {
         for (const ModelReader* model : models)
-            models_.push_back({model, View(camera, size, model->info().lattice), {}});
+            models_.push_back(
+                {model, View(camera, size, model->info().lattice, settings.select), {}});
     }
 
     OfflinePicture run() {
@@ -97,7 +96,7 @@ private:
         if (settings_.pixels > 0) return;
         for (const SceneModel& model : models_)
             for (const NodeIndex node : model.cut.nodes)
-                if (const double error = model.errorInPixels(node); std::isfinite(error))
+                if (const double error = model.pixelsOf(node); std::isfinite(error))
                     settings_.shade.value_max = std::max(settings_.shade.value_max, float(error));
     }
 
@@ -176,7 +175,7 @@ private:
         patch.mesh = &mesh;
         patch.one_sided = model.node(index).closed;
         patch.id = index + m * 0x9e3779b9u;  // far from the numbers of other models' nodes
-        patch.value = settings_.shade.show == Show::kError ? float(model.errorInPixels(index))
+        patch.value = settings_.shade.show == Show::kError ? float(model.pixelsOf(index))
                                                            : float(model.node(index).level);
         return patch;
     }

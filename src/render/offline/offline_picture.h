@@ -26,8 +26,9 @@ struct OfflineSettings {
     DrawWith renderer = DrawWith::kCpu;
     /// Tolerance in pixels (multires/view.h); 0 draws the full mesh.
     double pixels = 1;
-    Culling culling;  ///< of contribution, only where there is a tolerance
-    int samples = 1;  ///< 1 or 4
+    SelectBy select = SelectBy::kError;  ///< what it bounds; face sizes only where models know them
+    Culling culling;                     ///< of contribution, only where there is a tolerance
+    int samples = 1;                     ///< 1 or 4
     /// value_min and value_max are set by drawModels(): Show::kError shows errors in pixels, from 0
     /// to the tolerance, or to the largest one drawn where there is none. From within a closed part
     /// everything is two-sided (runtime/eye_side.h).
