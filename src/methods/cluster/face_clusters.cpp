@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 #include <numeric>
 #include <queue>
 
@@ -38,20 +39,22 @@ public:
         }
         normal_scale_ = settings.normal_weight * float(area / count);
         const uint64_t first = count - missing_;
-        for (uint64_t k = 0; k < first; ++k) {
-            seed_.push_back(uint32_t((2 * k + 1) * mesh.faceCount() / (2 * first)));
-            proxy_.push_back(face_[seed_.back()]);
-        }
+        for (uint64_t f = 0; f < mesh.faceCount(); ++f)
+            label_[f] = uint32_t(f * first / mesh.faceCount());
+        seed_.resize(first);
+        proxy_.resize(first);
     }
 
     Groups run() {
         for (int round = 1; round < settings_.most_rounds; ++round) {
-            grow(false);
-            const bool changed = chooseRepresentatives();
-            if (!changed && missing_ == 0) break;
+            findProxies();
+            const uint32_t moved = sweep();
+            if (moved == 0 && missing_ == 0) break;
             addRepresentatives(missing_ / uint32_t(settings_.most_rounds - round));
         }
-        grow(true);
+        findProxies();
+        chooseRepresentatives();
+        growDiscs();
         growRest();
         return inOrder();
     }
@@ -90,21 +93,42 @@ private:
         offerNeighbours(f);
     }
 
-    void takeWaiting(bool discs, uint32_t most) {
+    void takeWaiting(uint32_t most) {
         for (uint32_t taken = 0; !waiting_.empty() && taken < most;) {
             const uint32_t h = uint32_t(waiting_.top());
             waiting_.pop();
             const uint32_t f = mesh_.face[h];
             if (label_[f] != kNone) continue;
             const uint32_t region = label_[mesh_.face[mesh_.twin[h]]];
-            if (discs && !staysDisc(f, region)) continue;
+            if (!staysDisc(f, region)) continue;
             take(f, region);
             ++taken;
         }
         waiting_ = {};
     }
 
-    void grow(bool discs) {
+    /// Each face goes to the region next to it that it costs least; returns how many moved.
+    uint32_t sweep() {
+        uint32_t moved = 0;
+        for (uint32_t f = 0; f < mesh_.faceCount(); ++f) {
+            const uint32_t own = label_[f];
+            uint32_t best = own;
+            float least = -1;
+            for (uint32_t h = mesh_.face_begin[f]; h < mesh_.face_begin[f + 1]; ++h) {
+                const uint32_t t = mesh_.twin[h];
+                if (t == kNone) continue;
+                const uint32_t other = label_[mesh_.face[t]];
+                if (other == own || other == best) continue;
+                if (least < 0) least = std::max(0.0f, cost(f, own));
+                if (const float c = cost(f, other); c < least) least = c, best = other;
+            }
+            moved += best != own;
+            label_[f] = best;
+        }
+        return moved;
+    }
+
+    void growDiscs() {
         std::fill(label_.begin(), label_.end(), kNone);
         outline_.clear();
         for (uint32_t k = 0; k < seed_.size(); ++k) {
@@ -112,7 +136,7 @@ private:
             outline_.push_back(mesh_.corners(seed_[k]));
         }
         for (const uint32_t f : seed_) offerNeighbours(f);
-        takeWaiting(discs, mesh_.faceCount());
+        takeWaiting(mesh_.faceCount());
     }
 
     /// What no region took: components without a representative, and what no region could take.
@@ -125,7 +149,7 @@ private:
             proxy_.push_back(face_[f]);
             outline_.push_back(mesh_.corners(f));
             take(f, region);
-            takeWaiting(true, most);
+            takeWaiting(most);
         }
     }
 
@@ -160,34 +184,41 @@ private:
         return false;
     }
 
-    /// False when none changes.
-    bool chooseRepresentatives() {
+    /// Regions without faces go.
+    void findProxies() {
         std::vector<FaceShape> sum(seed_.size());
-        for (uint32_t f = 0; f < mesh_.faceCount(); ++f)
-            if (label_[f] != kNone) sum[label_[f]].add(mesh_.shape[f]);
-        for (uint32_t k = 0; k < seed_.size(); ++k) proxy_[k] = proxyOf(sum[k]);
-        std::vector<uint32_t> best(seed_);
-        std::vector<float> least(seed_.size());
-        for (uint32_t k = 0; k < seed_.size(); ++k) least[k] = cost(seed_[k], k);
+        std::vector<uint32_t> faces(seed_.size(), 0);
+        for (uint32_t f = 0; f < mesh_.faceCount(); ++f) {
+            sum[label_[f]].add(mesh_.shape[f]);
+            ++faces[label_[f]];
+        }
+        uint32_t count = 0;
+        for (uint32_t k = 0; k < faces.size(); ++k) {
+            if (faces[k] == 0) continue;
+            proxy_[count] = proxyOf(sum[k]);
+            faces[k] = count++;
+        }
+        if (count < faces.size())
+            for (uint32_t& k : label_) k = faces[k];
+        proxy_.resize(count);
+        seed_.resize(count);
+    }
+
+    void chooseRepresentatives() {
+        std::vector<float> least(seed_.size(), std::numeric_limits<float>::infinity());
         for (uint32_t f = 0; f < mesh_.faceCount(); ++f) {
             const uint32_t k = label_[f];
-            if (k == kNone) continue;
             const float c = cost(f, k);
-            if (c < least[k]) least[k] = c, best[k] = f;
+            if (c < least[k]) least[k] = c, seed_[k] = f;
         }
-        const bool changed = best != seed_;
-        seed_ = best;
-        return changed;
     }
 
     /// At the faces to which their regions bend most, one a region, in the regions where that is
     /// most.
     void addRepresentatives(uint32_t count) {
-        std::vector<std::pair<float, uint32_t>> worst;
-        for (const uint32_t f : seed_) worst.push_back({0.0f, f});
+        std::vector<std::pair<float, uint32_t>> worst(seed_.size());
         for (uint32_t f = 0; f < mesh_.faceCount(); ++f) {
             const uint32_t k = label_[f];
-            if (k == kNone || f == seed_[k]) continue;
             const float b = bend(f, k);
             if (b > worst[k].first) worst[k] = {b, f};
         }
@@ -196,6 +227,7 @@ private:
         });
         missing_ -= count;
         for (uint32_t i = 0; i < std::min<size_t>(count, worst.size()) && worst[i].first > 0; ++i) {
+            label_[worst[i].second] = uint32_t(seed_.size());
             seed_.push_back(worst[i].second);
             proxy_.push_back(face_[worst[i].second]);
         }
