@@ -62,18 +62,14 @@ void appendVertex(const Mesh& from, uint32_t v, Mesh& to) {
     copyVertex(from, v, to);
 }
 
-CellLayer firstLayer(const CellMesh& leaf, float error, CellId cell, const Octree& octree,
-                     const InterfaceTable& table) {
+namespace {
+
+/// Polygons and pairs of what `triangles` are of a leaf: all of them, or those at its interfaces.
+CellLayer polygonsOfLeaf(const Mesh& mesh, std::span<const uint32_t> number,
+                         std::span<const uint8_t> at_interface) {
     CellLayer out;
-    const Mesh& mesh = leaf.mesh;
-    std::vector<uint32_t> names(mesh.vertexCount()), number(mesh.vertexCount(), kNone);
+    std::vector<uint32_t> names(mesh.vertexCount());
     std::iota(names.begin(), names.end(), 0u);
-    std::vector<uint8_t> at_interface(mesh.vertexCount(), 0);
-    const int layer = octree.firstLayer(cell);
-    for (uint32_t v = 0; v < mesh.vertexCount(); ++v) {
-        number[v] = table.find(mesh.position[v]);
-        at_interface[v] = number[v] != kNone && table.cellsAt(number[v], layer).count > 1;
-    }
     out.polygons =
         polygonsOf(mesh, names, at_interface, std::vector<uint8_t>(mesh.vertexCount(), 0));
     markIrregular(out.polygons);
@@ -84,6 +80,30 @@ CellLayer firstLayer(const CellMesh& leaf, float error, CellId cell, const Octre
                     {std::min(number[v], number[w]), std::max(number[v], number[w])});
     std::sort(out.joined.begin(), out.joined.end());
     out.joined.erase(std::unique(out.joined.begin(), out.joined.end()), out.joined.end());
+    return out;
+}
+
+/// Of each vertex of a leaf, its number in the table and whether other cells use it.
+struct LeafVertices {
+    LeafVertices(const Mesh& mesh, CellId cell, const Octree& octree, const InterfaceTable& table)
+        : number(mesh.vertexCount()), at_interface(mesh.vertexCount()) {
+        const int layer = octree.firstLayer(cell);
+        for (uint32_t v = 0; v < mesh.vertexCount(); ++v) {
+            number[v] = table.find(mesh.position[v]);
+            at_interface[v] = number[v] != kNone && table.cellsAt(number[v], layer).count > 1;
+        }
+    }
+    std::vector<uint32_t> number;
+    std::vector<uint8_t> at_interface;
+};
+
+}  // namespace
+
+CellLayer firstLayer(const CellMesh& leaf, float error, CellId cell, const Octree& octree,
+                     const InterfaceTable& table) {
+    const Mesh& mesh = leaf.mesh;
+    const LeafVertices vertices(mesh, cell, octree, table);
+    CellLayer out = polygonsOfLeaf(mesh, vertices.number, vertices.at_interface);
     out.triangles.mesh = mesh;
     out.triangles.face.resize(mesh.triangleCount());
     std::iota(out.triangles.face.begin(), out.triangles.face.end(), 0u);
@@ -91,6 +111,21 @@ CellLayer firstLayer(const CellMesh& leaf, float error, CellId cell, const Octre
     out.error = error;
     out.closed = leaf.closed;
     return out;
+}
+
+CellLayer interfacesOfLeaf(const CellMesh& leaf, CellId cell, const Octree& octree,
+                           const InterfaceTable& table) {
+    const LeafVertices vertices(leaf.mesh, cell, octree, table);
+    Mesh part;
+    part.position = leaf.mesh.position;
+    for (size_t t = 0; t < leaf.mesh.triangleCount(); ++t) {
+        const auto& [a, b, c] = leaf.mesh.triangle[t];
+        const auto& at = vertices.at_interface;
+        if (!at[a] && !at[b] && !at[c]) continue;
+        part.triangle.push_back(leaf.mesh.triangle[t]);
+        part.edge_class.push_back(leaf.mesh.edge_class[t]);
+    }
+    return polygonsOfLeaf(part, vertices.number, vertices.at_interface);
 }
 
 CellLayer joinLayers(std::span<const CellLayer> below, int layer, const InterfaceTable& table) {

@@ -29,6 +29,11 @@ struct CellLayer {
 CellLayer firstLayer(const CellMesh& leaf, float error, CellId cell, const Octree& octree,
                      const InterfaceTable& table);
 
+/// The same, of nothing but the triangles at vertices that other cells use, their polygons and
+/// `joined`: all that these cells are told.
+CellLayer interfacesOfLeaf(const CellMesh& leaf, CellId cell, const Octree& octree,
+                           const InterfaceTable& table);
+
 /// What a cell's next layer begins with: the layers of its children, or its own. What no other cell
 /// uses in `layer`, the next one, is no interface any more.
 CellLayer joinLayers(std::span<const CellLayer> below, int layer, const InterfaceTable& table);

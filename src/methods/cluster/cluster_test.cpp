@@ -13,6 +13,7 @@
 #include "methods/cluster/anchors.h"
 #include "methods/cluster/cluster_testing.h"
 #include "methods/cluster/layers.h"
+#include "methods/cluster/placement.h"
 #include "simplify/deviation_surface.h"
 #include "simplify/test_meshes.h"
 
@@ -107,6 +108,56 @@ std::vector<uint16_t> randomLayers(const LayeredPiece& piece, uint64_t seed) {
     for (size_t c = 0; c < piece.cell.size(); ++c)
         layers.push_back(uint16_t(random() % (piece.layers + 1u)));
     return layers;
+}
+
+/// A super face's groups merged, as in the first layer, of a mesh that is one cell.
+PolygonMesh firstSuperFaces(const Mesh& mesh, const std::vector<uint8_t>& interface) {
+    std::vector<uint32_t> names(mesh.vertexCount());
+    std::iota(names.begin(), names.end(), 0u);
+    const PolygonMesh polygons =
+        polygonsOf(mesh, names, interface, std::vector<uint8_t>(mesh.vertexCount(), 0));
+    const Groups groups = clusterFaces(polygons, polygons.faceCount() / 12);
+    return mergeFaces(polygons, groups, findAnchors(polygons, groups));
+}
+
+TEST(Cluster, AnchorsMoveOutOfCurvedSurfacesAndNeverAtBordersAndInterfaces) {
+    const Mesh ball = test::toLattice(test::sphereShape(40), 1 << 20);
+    std::vector<uint8_t> interface(ball.vertexCount());
+    for (uint32_t v = 0; v < ball.vertexCount(); v += 3) interface[v] = 1;
+    const Box3i everywhere{Vec3i(0), Vec3i(kLatticeMax)};
+    const PolygonMesh before = firstSuperFaces(ball, interface);
+    PolygonMesh after = before;
+    const std::vector<uint32_t> moved = moveAnchors(after, everywhere);
+    EXPECT_GT(moved.size(), before.vertexCount() / 4);
+    EXPECT_EQ(after.name, before.name);
+    Box3d box;
+    for (const Vec3i& p : ball.position) box.add(Vec3d(p));
+    const auto radius = [&](const Vec3i& p) {
+        return glm::length(Vec3d(p) - 0.5 * (box.min + box.max));
+    };
+    size_t outward = 0;
+    for (uint32_t v = 0; v < before.vertexCount(); ++v) {
+        const bool has_moved = std::binary_search(moved.begin(), moved.end(), v);
+        EXPECT_EQ(has_moved, after.position[v] != before.position[v]);
+        EXPECT_FALSE(has_moved && before.interface_[v]);
+        outward += has_moved && radius(after.position[v]) > radius(before.position[v]);
+    }
+    // Planes through the centroids of faces of a ball meet outside of it.
+    EXPECT_GT(outward, moved.size() * 3 / 4);
+
+    PolygonMesh in_room = before;
+    const Box3i room{Vec3i(box.min), Vec3i(0.5 * (box.min + box.max))};
+    for (const uint32_t v : moveAnchors(in_room, room))
+        EXPECT_EQ(in_room.position[v], glm::clamp(in_room.position[v], room.min, room.max));
+
+    const Mesh sheet = test::toLattice(test::gridShape(50, 0.2), 1 << 16);
+    PolygonMesh open = firstSuperFaces(sheet, std::vector<uint8_t>(sheet.vertexCount(), 0));
+    std::vector<uint8_t> at_border(open.vertexCount());
+    for (uint32_t h = 0; h < open.halfEdgeCount(); ++h)
+        if (open.twin[h] == kNone) at_border[open.corner[h]] = at_border[open.end(h)] = 1;
+    const std::vector<uint32_t> inner = moveAnchors(open, everywhere);
+    EXPECT_FALSE(inner.empty());
+    for (const uint32_t v : inner) EXPECT_FALSE(at_border[v]);
 }
 
 TEST(Cluster, EachLayerIsWhole) {

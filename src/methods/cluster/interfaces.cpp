@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <map>
-#include <set>
 
 #include "base/check.h"
 #include "base/disjoint_sets.h"
@@ -51,17 +50,24 @@ bool isRegular(const Mesh& mesh, std::span<const EdgeUse> uses) {
 }  // namespace
 
 bool fanMayMerge(const PolygonMesh& mesh, std::span<const uint32_t> fan) {
-    std::set<uint32_t> faces, vertices, begins;
-    for (const uint32_t h : fan) faces.insert(mesh.face[h]);
-    if (faces.size() != fan.size()) return false;
+    // Few of each: looked through, not searched.
+    std::vector<uint32_t> faces, vertices, begins;
+    const auto has = [](const std::vector<uint32_t>& values, uint32_t value) {
+        return std::find(values.begin(), values.end(), value) != values.end();
+    };
+    for (const uint32_t h : fan) {
+        if (has(faces, mesh.face[h])) return false;
+        faces.push_back(mesh.face[h]);
+    }
     size_t half_edges = 0;
     for (const uint32_t f : faces)
         for (uint32_t h = mesh.face_begin[f]; h < mesh.face_begin[f + 1]; ++h) {
             ++half_edges;
-            vertices.insert(mesh.corner[h]);
-            const uint32_t t = mesh.twin[h];
-            if (t != kNone && faces.contains(mesh.face[t])) continue;
-            if (!begins.insert(mesh.corner[h]).second) return false;
+            const uint32_t v = mesh.corner[h], t = mesh.twin[h];
+            if (!has(vertices, v)) vertices.push_back(v);
+            if (t != kNone && has(faces, mesh.face[t])) continue;
+            if (has(begins, v)) return false;
+            begins.push_back(v);
         }
     if (begins.size() < 4) return false;
     // One piece, as all faces share the vertex: a disc by Euler's count, if it is one outline.

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <map>
 #include <unordered_map>
-#include <unordered_set>
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "coarsen/key_map.h"
 #include "coarsen/mesh_joiner.h"
 #include "geometry/enclosing_ball.h"
 #include "methods/cluster/cell_layer.h"
@@ -89,8 +89,15 @@ public:
             high_ = glm::min(corner + ((1 << bits) - 1), Vec3i(kLatticeMax));
         }
     }
-    void take(const std::vector<Vec3i>& points) {
-        for (const Vec3i& p : points) taken_.insert(latticeKey(p));
+    Box3i room() const { return {low_, high_}; }
+    void occupy(const std::vector<Vec3i>& points) {
+        for (const Vec3i& p : points) taken_.insert(latticeKey(p), 0);
+    }
+    /// Moves a point to the lattice's step, and takes it; false where it is not free.
+    bool take(Vec3i& p) {
+        p = snapToShift(p, shift_);
+        return p == glm::clamp(p, low_, high_) && table_.find(p) == kNone &&
+               taken_.insert(latticeKey(p), 0).second;
     }
     /// Near another one, and none given before.
     Vec3i near(const Vec3i& wanted) {
@@ -104,7 +111,7 @@ public:
                         if (std::max({std::abs(x), std::abs(y), std::abs(z)}) != reach) continue;
                         const Vec3i p = first + Vec3i(x, y, z);
                         if (p != glm::clamp(p, low_, high_) || table_.find(p) != kNone) continue;
-                        if (taken_.insert(latticeKey(p)).second) return p;
+                        if (taken_.insert(latticeKey(p), 0).second) return p;
                     }
         CHECK(false);
         return wanted;
@@ -122,7 +129,7 @@ private:
     int shift_;
     const InterfaceTable& table_;
     Vec3i low_{0}, high_{kLatticeMax};
-    std::unordered_set<uint64_t> taken_;
+    KeyMap taken_;
 };
 
 class Builder {
@@ -167,6 +174,8 @@ private:
     }
     /// What the step begins with, and if that is more than one layer, these, unless null.
     CellLayer load(const CellStep& step, Worker& worker, std::vector<CellLayer>* below) const;
+    /// Of that what the choice of what leaves needs.
+    CellLayer loadInterfaces(const CellStep& step, Worker& worker) const;
     UnitResult runUnit(const Unit& unit);
     void runStep(size_t index, UnitResult& result, std::vector<Mesh>& patches,
                  std::vector<Mesh>& joints);
@@ -233,7 +242,7 @@ void Builder::buildLayer() {
     steps_ = octree_.stepsOf(layer_);
     removals_ = std::make_unique<Removals>(*table_, layer_, *space_.budget);
     parallelFor(steps_.size(), [&](size_t i) {
-        const CellLayer base = load(steps_[i], workers_.local(), nullptr);
+        const CellLayer base = loadInterfaces(steps_[i], workers_.local());
         removals_->report(steps_[i].cell, base.polygons, base.joined);
         progress_.tick(0);
     });
@@ -278,6 +287,15 @@ CellLayer Builder::load(const CellStep& step, Worker& worker, std::vector<CellLa
     return base;
 }
 
+CellLayer Builder::loadInterfaces(const CellStep& step, Worker& worker) const {
+    if (!isFirst(step)) return load(step, worker, nullptr);
+    const CellBlob& blob = leaves_.blobs.at(step.cell);
+    blob.store->get(blob, worker.leaf);
+    CellLayer base = interfacesOfLeaf(worker.leaf, step.cell, octree_, *table_);
+    continueLayer(base, layer_, *table_);
+    return base;
+}
+
 Node Builder::leafNode(const CellStep& step, const CellLayer& layer, Worker& worker) const {
     Node node = describe(layer.triangles.mesh, layer.closed, worker);
     node.saturated = node.bounds;
@@ -293,22 +311,27 @@ LayerStep Builder::makeLayer(const CellStep& step, const CellLayer& base) const 
         if (base.polygons.interface_[v])
             removed[v] = removals_->isRemoved(table_->find(base.polygons.position[v]));
     const bool first = isFirst(step);
-    LayerStep next =
-        nextLayer(base.polygons, base.triangles, removed,
-                  first ? settings_.first_faces : settings_.faces, settings_.clustering);
+    FreePoints points(step.cell, settings_.shift, *table_);
+    LayerStep next = nextLayer(base.polygons, base.triangles, removed,
+                               first ? settings_.first_faces : settings_.faces, points.room(),
+                               settings_.clustering);
+    if (!next.moved.empty() || !next.triangles.to_free.empty()) {
+        points.occupy(base.triangles.mesh.position);
+        points.occupy(base.inner.position);
+    }
+    for (const uint32_t v : next.moved) {
+        Vec3i& p = next.polygons.position[v];
+        if (!points.take(p)) p = base.polygons.position[next.polygons.name[v]];
+        next.triangles.mesh.position[v] = p;
+    }
     // Above the leaves, cells are to be about as large as theirs are in their last layer.
     const bool is_leaf = step.cell == step.below[0];
     size_t target = base.triangles.mesh.triangleCount() / 4;
     if (!is_leaf) target = std::min<size_t>(target, settings_.leaf_triangles / 8);
     if (next.triangles.mesh.triangleCount() > target + target / 2) dropComponents(next, target);
-    if (!next.triangles.to_free.empty()) {
-        FreePoints points(step.cell, settings_.shift, *table_);
-        points.take(base.triangles.mesh.position);
-        points.take(base.inner.position);
-        for (const uint32_t v : next.triangles.to_free) {
-            Vec3i& p = next.triangles.mesh.position[v];
-            p = points.near(p);
-        }
+    for (const uint32_t v : next.triangles.to_free) {
+        Vec3i& p = next.triangles.mesh.position[v];
+        p = points.near(p);
     }
     return next;
 }

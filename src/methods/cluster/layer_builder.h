@@ -15,8 +15,8 @@ namespace pietra::cluster {
 
 struct BuilderSettings {
     uint32_t leaf_triangles = 8000;
-    uint32_t first_faces = 16;  ///< triangles in a super face of the first layer
-    uint32_t faces = 4;         ///< super faces of a layer in one of the next
+    uint32_t first_faces = 12;  ///< triangles in a super face of the first layer
+    uint32_t faces = 3;         ///< super faces of a layer in one of the next
     ClusterSettings clustering;
     int shift = 0;
     AttributeSchema schema;

@@ -9,6 +9,7 @@
 #include "geometry/lattice.h"
 #include "methods/cluster/anchors.h"
 #include "methods/cluster/interfaces.h"
+#include "methods/cluster/placement.h"
 #include "simplify/deviation_direction.h"
 
 namespace pietra::cluster {
@@ -20,19 +21,33 @@ namespace {
 constexpr float kSmallPart = 0.25f;
 
 /// How often polygons that fold over get a vertex back.
-constexpr int kUnfoldingRounds = 2;
+constexpr int kUnfoldingRounds = 1;
 
-/// Where to look for what became of each triangle: among those of its super face, by turns.
+/// Where to look for what became of each triangle: the one of its super face whose middle is
+/// nearest to its own.
 std::vector<uint32_t> triangleMap(const LayerTriangles& below, const LayerTriangles& layer,
                                   std::span<const uint32_t> super_face) {
-    std::vector<uint32_t> first(layer.face.empty() ? 1 : layer.face.back() + 2, 0), next, map;
+    std::vector<uint32_t> first(layer.face.empty() ? 1 : layer.face.back() + 2, 0), map;
     for (const uint32_t f : layer.face) ++first[f + 1];
     for (size_t f = 1; f < first.size(); ++f) first[f] += first[f - 1];
-    next = first;
-    for (const uint32_t f : below.face) {
-        const uint32_t s = super_face[f];
-        if (next[s] == first[s + 1]) next[s] = first[s];
-        map.push_back(next[s]++);
+    const auto middle = [](const Mesh& mesh, size_t t) {
+        const auto& [a, b, c] = mesh.triangle[t];
+        return Vec3f(mesh.position[a] + mesh.position[b] + mesh.position[c]);
+    };
+    std::vector<Vec3f> middles;
+    for (size_t t = 0; t < layer.mesh.triangleCount(); ++t)
+        middles.push_back(middle(layer.mesh, t));
+    map.reserve(below.face.size());
+    for (size_t t = 0; t < below.face.size(); ++t) {
+        const uint32_t s = super_face[below.face[t]];
+        const Vec3f here = middle(below.mesh, t);
+        uint32_t best = first[s];
+        float least = HUGE_VALF;
+        for (uint32_t k = first[s]; k < first[s + 1]; ++k) {
+            const Vec3f way = middles[k] - here;
+            if (const float d = glm::dot(way, way); d < least) least = d, best = k;
+        }
+        map.push_back(best);
     }
     return map;
 }
@@ -64,7 +79,7 @@ std::vector<uint8_t> changedTriangles(const Mesh& below, const Mesh& layer,
 }  // namespace
 
 LayerStep nextLayer(const PolygonMesh& below, const LayerTriangles& below_triangles,
-                    std::span<const uint8_t> removed, uint32_t faces_each,
+                    std::span<const uint8_t> removed, uint32_t faces_each, const Box3i& room,
                     const ClusterSettings& settings) {
     const Groups fans = fansWithout(below, removed);
     std::vector<uint8_t> stays;
@@ -76,6 +91,7 @@ LayerStep nextLayer(const PolygonMesh& below, const LayerTriangles& below_triang
     const std::vector<uint32_t> starts = outlineStarts(polygons, groups);
     for (int round = 0;; ++round) {
         step.polygons = mergeFaces(polygons, groups, keep);
+        step.moved = moveAnchors(step.polygons, room);
         step.triangles = triangulate(step.polygons);
         bool changed = false;
         if (round < kUnfoldingRounds)

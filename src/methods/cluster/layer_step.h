@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "geometry/bounds.h"
 #include "methods/cluster/face_clusters.h"
 #include "methods/cluster/triangulation.h"
 #include "simplify/deviation.h"
@@ -17,14 +18,17 @@ struct LayerStep {
     PolygonMesh polygons;
     /// Those of `to_free` have still to be moved to free points, before anything is bounded.
     LayerTriangles triangles;
+    /// Vertices of `polygons` that were moved to where others might lie: the caller moves them
+    /// back, in both meshes, where so.
+    std::vector<uint32_t> moved;
     /// One a triangle of the layer below: where to look for what became of it.
     std::vector<uint32_t> triangle_map;
 };
 
 /// `below_triangles` are those of `below`. `removed`: one a vertex of the model, by its name.
-/// `faces_each`: faces of `below` in one of the result, about.
+/// `faces_each`: faces of `below` in one of the result, about. `room`: where vertices may be moved.
 LayerStep nextLayer(const PolygonMesh& below, const LayerTriangles& below_triangles,
-                    std::span<const uint8_t> removed, uint32_t faces_each,
+                    std::span<const uint8_t> removed, uint32_t faces_each, const Box3i& room,
                     const ClusterSettings& settings);
 
 /// A cell's strips of one step, as meshes of their own. Where a vertex leaves, one of the two cells

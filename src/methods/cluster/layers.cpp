@@ -44,17 +44,21 @@ PolygonMesh cellMesh(const Mesh& model, std::span<const uint32_t> triangles,
 class FreePoints {
 public:
     explicit FreePoints(const std::vector<Vec3i>& vertices) : vertices_(vertices) {}
+    /// False where it is not free.
+    bool take(const Vec3i& p) {
+        if (taken_.empty())
+            for (const Vec3i& other : vertices_) taken_.insert(latticeKey(other));
+        return taken_.insert(latticeKey(p)).second;
+    }
     /// Near another one, and none given before.
     Vec3i near(const Vec3i& wanted) {
-        if (taken_.empty())
-            for (const Vec3i& p : vertices_) taken_.insert(latticeKey(p));
         for (int32_t reach = 0;; ++reach)
             for (int32_t x = -reach; x <= reach; ++x)
                 for (int32_t y = -reach; y <= reach; ++y)
                     for (int32_t z = -reach; z <= reach; ++z) {
                         const Vec3i p =
                             glm::clamp(wanted + Vec3i(x, y, z), Vec3i(0), Vec3i(kLatticeMax));
-                        if (taken_.insert(latticeKey(p)).second) return p;
+                        if (take(p)) return p;
                     }
     }
 
@@ -175,14 +179,21 @@ LayeredPiece buildLayers(const Mesh& mesh, const CellTriangles& cells,
         const uint32_t faces_each = layer == 1 ? settings.first_faces : settings.faces;
         parallelFor(count, [&](size_t c) {
             step[c] = nextLayer(current[c], piece.cell[c].layer.back(), interfaces.justRemoved(),
-                                faces_each, settings.clustering);
+                                faces_each, {Vec3i(0), Vec3i(kLatticeMax)}, settings.clustering);
             current[c] = std::move(step[c].polygons);
         });
-        for (LayerStep& one : step)
+        for (size_t c = 0; c < count; ++c) {
+            LayerStep& one = step[c];
+            for (const uint32_t v : one.moved) {
+                Vec3i& p = current[c].position[v];
+                if (!free_points.take(p)) p = mesh.position[current[c].name[v]];
+                one.triangles.mesh.position[v] = p;
+            }
             for (const uint32_t v : one.triangles.to_free) {
                 Vec3i& p = one.triangles.mesh.position[v];
                 p = free_points.near(p);
             }
+        }
         spend(piece.seconds.faces);
         std::vector<ListedStrips> own(count);
         std::vector<float> given(strips.size(), -1);

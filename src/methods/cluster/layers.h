@@ -16,8 +16,8 @@ namespace pietra::cluster {
 struct LayerSettings {
     uint32_t cell_vertices = 8192;  ///< most in an octree cell
     uint16_t layers = 6;            ///< above the input's triangles
-    uint32_t first_faces = 16;      ///< triangles in a super face of layer 1
-    uint32_t faces = 4;             ///< super faces of a layer in one of the next
+    uint32_t first_faces = 12;      ///< triangles in a super face of layer 1
+    uint32_t faces = 3;             ///< super faces of a layer in one of the next
     ClusterSettings clustering;
 };
 

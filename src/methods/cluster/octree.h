@@ -1,7 +1,7 @@
 #pragma once
 // The octree of Wu and Huang 2014 and the layers of its cells (docs/design/cluster.md). Layers are
 // numbered for the whole model, so that those of one number are about as coarse everywhere: a leaf
-// at depth d of D begins with layer D - d, its input triangles, and has two more; a cell above the
+// at depth d of D begins with layer D - d, its input triangles, and has three more; a cell above the
 // leaves has the one layer that follows its children's last. The root, of depth 0, is the top.
 // Immutable, thread-safe.
 
@@ -12,7 +12,7 @@
 namespace pietra::cluster {
 
 /// Layers of a leaf above its triangles.
-inline constexpr int kLocalLayers = 2;
+inline constexpr int kLocalLayers = 3;
 
 /// The root's is 1.
 inline int depthOf(CellId cell) {

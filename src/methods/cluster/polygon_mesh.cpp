@@ -49,6 +49,11 @@ PolygonMesh polygonsOf(const Mesh& triangles, std::span<const uint32_t> names,
     mesh.irregular.assign(irregular.begin(), irregular.end());
     const uint32_t faces = uint32_t(triangles.triangleCount());
     mesh.middle.assign(faces, kNone);
+    mesh.shape.reserve(faces);
+    mesh.face_begin.reserve(faces + 1);
+    mesh.corner.reserve(3 * faces);
+    mesh.face.reserve(3 * faces);
+    mesh.edge_class.reserve(3 * faces);
     for (uint32_t f = 0; f < faces; ++f) {
         const Triangle& t = triangles.triangle[f];
         mesh.shape.push_back(
