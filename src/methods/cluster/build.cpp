@@ -8,7 +8,7 @@ namespace pietra::cluster {
 BuildReport build(TriangleSource& source, const BuildSettings& settings, Progress& progress) {
     BuildSettings own = settings;
     own.leaf_triangles *= 2;  // leaves have a quarter of it at least, not half
-    Construction work(source, own, {.name = "cluster", .stages = 2, .shape = CellShape::kCubes},
+    Construction work(source, own, {.name = "cluster", .stages = 3, .shape = CellShape::kCubes},
                       progress);
     const VertexTable& vertices = work.input.vertices;
     BuilderSettings builder;

@@ -151,9 +151,13 @@ public:
     BuilderCounts run() {
         progress_.beginStage("interfaces", 0);
         table_ = std::make_unique<InterfaceTable>(octree_, leaves_, *space_.budget, progress_);
-        // Layers have 4/3 of the input's triangles together: only progress depends on this guess.
-        progress_.beginStage("cluster", leaves_.triangles * 4 / 3);
-        for (layer_ = 1; layer_ <= octree_.topLayer(); ++layer_) buildLayer();
+        // How many triangles layers begin with: only progress depends on these guesses.
+        progress_.beginStage("local trees", leaves_.triangles * 3 / 2);
+        for (layer_ = 1; layer_ <= octree_.topLayer(); ++layer_) {
+            if (layer_ == kLocalLayers + 1)
+                progress_.beginStage("global tree", leaves_.triangles / 16);
+            buildLayer();
+        }
         writeTop();
         return counts_;
     }
