@@ -28,7 +28,7 @@ Construction::Construction(TriangleSource& source, const BuildSettings& settings
       checkpoint(settings.temp_dir, identityOf(settings, kind.name), settings.resume,
                  settings.checkpoint_seconds),
       space{settings.temp_dir, &budget_, plan_.work, checkpoint.folder()},
-      writer(settings.output, settings.force, settings.temp_dir, budget_),
+      writer(settings.output, settings.force, settings.temp_dir, budget_, checkpoint.folder()),
       input(readInput(progress)) {
     if (checkpoint.isDue()) saveInput();
 }

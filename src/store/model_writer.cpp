@@ -1,6 +1,7 @@
 #include "store/model_writer.h"
 
 #include <fcntl.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstring>
@@ -26,27 +27,86 @@ std::span<const std::byte> bytesOf(std::span<const T> values) {
 
 }  // namespace
 
+ModelWriter::Spool::Spool(const std::string& directory, const std::string& kept, const char* name)
+    : path_(kept.empty() ? "" : kept + "/" + name) {
+    if (path_.empty()) file_ = File(directory, File::Mode::kTemporary);
+}
+
+ModelWriter::Spool::~Spool() {
+    if (file_.isOpen() && !path_.empty() && !is_saved_) ::unlink(path_.c_str());
+}
+
 void ModelWriter::Spool::append(const void* data, size_t bytes) {
     const auto* begin = static_cast<const std::byte*>(data);
-    size_ += bytes;
     if (buffer_.size() + bytes > kSpoolBuffer) flush();
-    if (bytes > kSpoolBuffer)
-        file_.write(data, bytes);
-    else
-        buffer_.insert(buffer_.end(), begin, begin + bytes);
+    buffer_.insert(buffer_.end(), begin, begin + bytes);
+    size_ += bytes;
+    if (bytes > kSpoolBuffer) flush();
 }
 
 void ModelWriter::Spool::flush() {
-    file_.write(buffer_.data(), buffer_.size());
+    if (!file_.isOpen()) file_ = File(path_, File::Mode::kCreate);
+    file_.writeAt(size_ - buffer_.size(), buffer_.data(), buffer_.size());
     buffer_.clear();
 }
 
+void ModelWriter::Spool::save(StateWriter& state) {
+    CHECK(!path_.empty());
+    flush();
+    state.put(size_);
+    is_saved_ = true;
+}
+
+void ModelWriter::Spool::restore(StateReader& state) {
+    state.get(size_);
+    file_ = File(path_, File::Mode::kUpdate);
+    file_.truncate(size_);
+    is_saved_ = true;
+}
+
 ModelWriter::ModelWriter(const std::string& path, bool force, const std::string& temp_dir,
-                         Budget& budget)
+                         Budget& budget, const std::string& kept)
     : memory_(budget.reserve(kWriterMemory, "writing the model")),
       output_(path, force),
-      pages_(temp_dir),
-      nodes_(temp_dir) {}
+      pages_(temp_dir, kept, "pages"),
+      nodes_(temp_dir, kept, "nodes") {}
+
+void ModelWriter::save(StateWriter& state) {
+    pages_.save(state);
+    nodes_.save(state);
+    state.put(levels_.size());
+    for (const Level& level : levels_) {
+        state.put(level.pages_offset);
+        state.put(level.nodes_offset);
+        state.put(level.pages_bytes);
+        state.put(level.nodes);
+        state.put(level.pages);
+        state.put(level.blocks);
+    }
+    state.put(level_);
+    state.put(page_bytes_);
+    state.put(node_count_);
+    state.put(triangles_);
+}
+
+void ModelWriter::restore(StateReader& state) {
+    CHECK(levels_.empty());
+    pages_.restore(state);
+    nodes_.restore(state);
+    levels_.resize(state.get<size_t>());
+    for (Level& level : levels_) {
+        state.get(level.pages_offset);
+        state.get(level.nodes_offset);
+        state.get(level.pages_bytes);
+        state.get(level.nodes);
+        state.get(level.pages);
+        state.get(level.blocks);
+    }
+    state.get(level_);
+    state.get(page_bytes_);
+    state.get(node_count_);
+    state.get(triangles_);
+}
 
 void ModelWriter::beginLevel(uint32_t level) {
     CHECK_LT(level, kMaxLevels);
@@ -151,7 +211,9 @@ void ModelWriter::writePages(const Level& level, std::span<BlockEntry> blocks) {
         output_.file().writeAt(position_, buffer.data(), bytes);
         position_ += bytes;
         done += bytes;
-        // Gives the disk space back; a file system that cannot only keeps it until the end.
+        // Gives the disk space back; a file system that cannot only keeps it until the end, as do
+        // pages that another process may have to begin with.
+        if (pages_.isSaved()) continue;
         ::fallocate(pages_.file().descriptor(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE,
                     off_t(from), off_t(bytes));
     }

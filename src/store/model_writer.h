@@ -3,7 +3,8 @@
 // build makes them, into a file that holds them from coarse to fine.
 //
 // Pages and nodes wait in two temporary files, so memory stays at a few MiB, which are reserved
-// from the budget, whatever the model's size. The file appears under its name only when finish()
+// from the budget, whatever the model's size. Between levels, what there is may be saved, for
+// another process to go on from. The file appears under its name only when finish()
 // returns; on any error nothing is left behind. While the file is put together the waiting pages'
 // disk space is given back bit by bit. Its bytes depend on the arguments of the calls alone. Not
 // thread-safe.
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "base/budget.h"
+#include "base/state.h"
 #include "extmem/file.h"
 #include "multires/node.h"
 #include "store/model_format.h"
@@ -32,9 +34,10 @@ struct ModelIdentity {
 
 class ModelWriter {
 public:
-    /// `temp_dir` must exist. Throws UsageError if `path` exists and `force` is not set, IoError,
-    /// or MemoryError.
-    ModelWriter(const std::string& path, bool force, const std::string& temp_dir, Budget& budget);
+    /// `temp_dir` must exist. `kept`: as TempSpace has it. Throws UsageError if `path` exists and
+    /// `force` is not set, IoError, or MemoryError.
+    ModelWriter(const std::string& path, bool force, const std::string& temp_dir, Budget& budget,
+                const std::string& kept = "");
 
     /// Levels come in the order L, L-1, ..., 0, each once, with one page at least.
     void beginLevel(uint32_t level);
@@ -51,23 +54,36 @@ public:
     void finish(const ModelInfo& info, const ModelIdentity& identity = {},
                 std::span<const std::byte> method_section = {});
 
+    /// Between levels, where there is a folder of what is kept. Its files remain for restore(),
+    /// which comes before anything else, whatever becomes of this.
+    void save(StateWriter& state);
+    void restore(StateReader& state);
+
     uint64_t pageBytes() const { return page_bytes_; }
     uint64_t nodeCount() const { return node_count_; }
 
 private:
-    /// Appends to a temporary file through a buffer.
+    /// Appends to a temporary file through a buffer; to one with a name where that is kept.
     class Spool {
     public:
-        explicit Spool(const std::string& directory) : file_(directory, File::Mode::kTemporary) {}
+        Spool(const std::string& directory, const std::string& kept, const char* name);
+        ~Spool();
+        Spool(const Spool&) = delete;
+        Spool& operator=(const Spool&) = delete;
         void append(const void* data, size_t bytes);
         void flush();
+        void save(StateWriter& state);
+        void restore(StateReader& state);
+        bool isSaved() const { return is_saved_; }
         File& file() { return file_; }
         uint64_t size() const { return size_; }
 
     private:
+        std::string path_;  // empty: it has no name
         File file_;
         std::vector<std::byte> buffer_;
-        uint64_t size_ = 0;
+        uint64_t size_ = 0;  // with what is in the buffer
+        bool is_saved_ = false;
     };
     struct Level {
         uint64_t pages_offset = 0;  // in the spool of pages

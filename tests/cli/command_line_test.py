@@ -315,7 +315,10 @@ class Resume(CommandLineTest):
     def test_the_same_bytes_as_without_interruption(self):
         for method, part, number in (("pmesh", "input", signal.SIGKILL),
                                      ("pmesh", "method", signal.SIGINT),
-                                     ("tetra", "input", signal.SIGINT)):
+                                     ("tetra", "input", signal.SIGINT),
+                                     ("tetra", "method", signal.SIGKILL),
+                                     ("cluster", "input", signal.SIGKILL),
+                                     ("cluster", "method", signal.SIGINT)):
             self.build(*self.ARGUMENTS[:1], "whole.pietra", "--method", method,
                        *self.ARGUMENTS[1:])
             self.stop(method, number, part)

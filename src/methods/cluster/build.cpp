@@ -1,6 +1,5 @@
 #include "methods/cluster/build.h"
 
-#include "construction/construction.h"
 #include "methods/cluster/layer_builder.h"
 
 namespace pietra::cluster {
@@ -18,8 +17,7 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
     builder.quantisation_error = vertices.quantisationError();
     builder.jobs = settings.jobs;
     BuildReport report = work.report();
-    const BuilderCounts counts =
-        buildLayers(work.input, builder, work.space, work.writer, progress);
+    const BuilderCounts counts = buildLayers(work, builder, progress);
     report.levels = counts.levels;
     report.stored_triangles = counts.triangles;
     report.nodes = work.writer.nodeCount();

@@ -1,9 +1,9 @@
 #pragma once
-// K-means face clustering (Wu and Huang 2014, figure 1): K regions; each is known by its mean plane;
-// faces at its border go to the neighbour that they cost least (as Valette and Chassery, 2004, move
-// them, which is several times as fast as growing all regions anew); until that settles. Some
-// regions come later, where others bend most. In the end regions grow once more from the faces that
-// stand for them best, over the dual graph, always where it costs least, as discs with simple
+// K-means face clustering (Wu and Huang 2014, figure 1): K regions; each is known by its mean
+// plane; faces at its border go to the neighbour that they cost least (as Valette and Chassery,
+// 2004, move them, which is several times as fast as growing all regions anew); until that settles.
+// Some regions come later, where others bend most. In the end regions grow once more from the faces
+// that stand for them best, over the dual graph, always where it costs least, as discs with simple
 // outlines: what would close a ring or touch its own region is refused, and left to others, or
 // becomes a region of its own.
 //

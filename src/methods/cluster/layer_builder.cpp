@@ -1,5 +1,7 @@
 #include "methods/cluster/layer_builder.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -28,6 +30,14 @@ struct CellState {
     Node node;
     uint64_t position = 0;  // in the layers' spill
     size_t bytes = 0;
+};
+
+struct SavedCell {
+    SavedCell() = default;
+    SavedCell(const std::pair<const CellId, CellState>& cell)
+        : id(cell.first), state(cell.second) {}
+    CellId id;
+    CellState state;
 };
 
 struct Unit {
@@ -134,12 +144,12 @@ private:
 
 class Builder {
 public:
-    Builder(InputLeaves& input, const BuilderSettings& settings, TempSpace& space,
-            ModelWriter& writer, Progress& progress)
-        : leaves_(input.leaves),
+    Builder(Construction& work, const BuilderSettings& settings, Progress& progress)
+        : work_(work),
+          leaves_(work.input.leaves),
           settings_(settings),
-          space_(space),
-          writer_(writer),
+          space_(work.space),
+          writer_(work.writer),
           progress_(progress),
           octree_(octreeOf(leaves_)),
           groups_(uint32_t(octree_.leaves().size())) {
@@ -153,10 +163,14 @@ public:
         table_ = std::make_unique<InterfaceTable>(octree_, leaves_, *space_.budget, progress_);
         // How many triangles layers begin with: only progress depends on these guesses.
         progress_.beginStage("local trees", leaves_.triangles * 3 / 2);
-        for (layer_ = 1; layer_ <= octree_.topLayer(); ++layer_) {
-            if (layer_ == kLocalLayers + 1)
+        if (auto state = work_.stateToResume()) restore(*state);
+        while (layer_ < octree_.topLayer()) {
+            if (++layer_ == kLocalLayers + 1)
                 progress_.beginStage("global tree", leaves_.triangles / 16);
             buildLayer();
+            if (!work_.savedState([&](StateWriter& state) { save(state); })) continue;
+            if (!saved_layers_.empty()) work_.checkpoint.remove(saved_layers_);
+            saved_layers_ = layersOf(layer_);
         }
         writeTop();
         return counts_;
@@ -171,6 +185,9 @@ private:
     }
 
     void buildLayer();
+    static std::string layersOf(int layer) { return fmt::format("layers-{}", layer); }
+    void save(StateWriter& state);
+    void restore(StateReader& state);
     std::vector<Unit> unitsOf() const;
     uint64_t trianglesOf(const CellStep& step) const;
     bool isFirst(const CellStep& step) const {
@@ -198,6 +215,7 @@ private:
     void write(UnitResult& result);
     void writeTop();
 
+    Construction& work_;
     Leaves& leaves_;
     const BuilderSettings& settings_;
     TempSpace& space_;
@@ -208,7 +226,8 @@ private:
     const Octree octree_;
     uint32_t groups_;  // of the steps of this layer: from here on
     std::unique_ptr<InterfaceTable> table_;
-    int layer_ = 0;
+    int layer_ = 0;             // the last one begun
+    std::string saved_layers_;  // what the last state that was saved means
     std::vector<CellStep> steps_;
     std::unique_ptr<Removals> removals_;
     std::unordered_map<CellId, CellState> below_, states_;
@@ -253,7 +272,7 @@ void Builder::buildLayer() {
     removals_->choose();
     parallelFor(steps_.size(), [&](size_t i) { boundStripsOf(steps_[i]); });
 
-    layers_ = std::make_unique<Spill>(space_);
+    layers_ = std::make_unique<Spill>(space_, layersOf(layer_));
     states_.clear();
     nodes_in_level_ = 0;
     writer_.beginLevel(uint32_t(octree_.topLayer() - layer_ + 1));
@@ -265,6 +284,30 @@ void Builder::buildLayer() {
     groups_ += uint32_t(steps_.size());
     below_ = std::move(states_);
     layers_below_ = std::move(layers_);
+}
+
+/// What finished layers leave.
+void Builder::save(StateWriter& state) {
+    state.put(layer_);
+    writer_.save(state);
+    layers_below_->save();
+    state.put(layers_below_->bytes());
+    state.put(std::vector<SavedCell>(below_.begin(), below_.end()));
+    state.put(groups_);
+    state.put(counts_);
+}
+
+void Builder::restore(StateReader& state) {
+    state.get(layer_);
+    writer_.restore(state);
+    saved_layers_ = layersOf(layer_);
+    layers_below_ = std::make_unique<Spill>(space_, saved_layers_);
+    layers_below_->restore(state.get<uint64_t>());
+    std::vector<SavedCell> cells;
+    state.get(cells);
+    for (const auto& [id, cell] : cells) below_.emplace(id, cell);
+    state.get(groups_);
+    state.get(counts_);
 }
 
 CellLayer Builder::load(const CellStep& step, Worker& worker, std::vector<CellLayer>* below) const {
@@ -548,9 +591,8 @@ void Builder::writeTop() {
 
 }  // namespace
 
-BuilderCounts buildLayers(InputLeaves& input, const BuilderSettings& settings, TempSpace& space,
-                          ModelWriter& writer, Progress& progress) {
-    return Builder(input, settings, space, writer, progress).run();
+BuilderCounts buildLayers(Construction& work, const BuilderSettings& settings, Progress& progress) {
+    return Builder(work, settings, progress).run();
 }
 
 }  // namespace pietra::cluster

@@ -7,9 +7,8 @@
 //
 // Memory: the interfaces' table and some cells a thread; layers wait in the temporary space.
 
-#include "coarsen/input_leaves.h"
+#include "construction/construction.h"
 #include "methods/cluster/face_clusters.h"
-#include "store/model_writer.h"
 
 namespace pietra::cluster {
 
@@ -29,7 +28,7 @@ struct BuilderCounts {
     uint64_t triangles = 0;  ///< stored, over all levels
 };
 
-BuilderCounts buildLayers(InputLeaves& input, const BuilderSettings& settings, TempSpace& space,
-                          ModelWriter& writer, Progress& progress);
+/// Goes on from the last layer that was saved, where there is one.
+BuilderCounts buildLayers(Construction& work, const BuilderSettings& settings, Progress& progress);
 
 }  // namespace pietra::cluster

@@ -1,8 +1,8 @@
 #pragma once
 // The octree of Wu and Huang 2014 and the layers of its cells (docs/design/cluster.md). Layers are
 // numbered for the whole model, so that those of one number are about as coarse everywhere: a leaf
-// at depth d of D begins with layer D - d, its input triangles, and has three more; a cell above the
-// leaves has the one layer that follows its children's last. The root, of depth 0, is the top.
+// at depth d of D begins with layer D - d, its input triangles, and has three more; a cell above
+// the leaves has the one layer that follows its children's last. The root, of depth 0, is the top.
 // Immutable, thread-safe.
 
 #include <vector>

@@ -1,6 +1,5 @@
 #include "methods/tetra/build.h"
 
-#include "construction/construction.h"
 #include "methods/tetra/levels.h"
 
 namespace pietra::tetra {
@@ -12,8 +11,7 @@ BuildReport build(TriangleSource& source, const BuildSettings& settings, Progres
         settings.patch_triangles, vertices.lattice().shift,     source.schema(),
         vertices.scalarRanges(),  vertices.quantisationError(), settings.jobs};
     BuildReport report = work.report();
-    const LevelCounts counts =
-        buildLevels(work.input.leaves, level_settings, work.space, work.writer, progress);
+    const LevelCounts counts = buildLevels(work, level_settings, progress);
     report.levels = counts.levels;
     report.stored_triangles = counts.triangles;
     report.nodes = work.writer.nodeCount();

@@ -1,5 +1,7 @@
 #include "methods/tetra/levels.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -28,6 +30,12 @@ struct CellState {
     Sphere saturated;
 };
 
+struct SavedCell {
+    CellId id;
+    CellState state;
+    bool is_leaf;
+};
+
 /// Items that share a page.
 struct Unit {
     size_t first = 0, end = 0;
@@ -53,12 +61,12 @@ struct Worker {
 
 class LevelBuilder {
 public:
-    LevelBuilder(Leaves& leaves, const LevelSettings& settings, TempSpace& space,
-                 ModelWriter& writer, Progress& progress)
-        : leaves_(leaves),
+    LevelBuilder(Construction& work, const LevelSettings& settings, Progress& progress)
+        : work_(work),
+          leaves_(work.input.leaves),
           settings_(settings),
-          space_(space),
-          writer_(writer),
+          space_(work.space),
+          writer_(work.writer),
           progress_(progress),
           workers_([this] { return Worker(settings_); }) {
         page_settings_.shift = settings.shift;
@@ -69,13 +77,24 @@ public:
     LevelCounts run() {
         // Levels store about 3 times the input together: only progress depends on this guess.
         progress_.beginStage("coarsen", leaves_.triangles * 3);
-        for (int level = leaves_.tree->deepestLevel(); level >= 0; --level)
-            if (buildLevel(level)) counts_.levels = std::max(counts_.levels, uint32_t(level) + 1);
+        int level = leaves_.tree->deepestLevel();
+        if (auto state = work_.stateToResume()) level = restore(*state);
+        for (; level >= 0; --level) {
+            if (!buildLevel(level)) continue;
+            counts_.levels = std::max(counts_.levels, uint32_t(level) + 1);
+            if (!work_.savedState([&](StateWriter& state) { save(level, state); })) continue;
+            if (!saved_cells_.empty()) work_.checkpoint.remove(saved_cells_);
+            saved_cells_ = cellsOf(level);
+        }
         return counts_;
     }
 
 private:
     bool buildLevel(int level);
+    static std::string cellsOf(int level) { return fmt::format("cells-{}", level); }
+    int scalars() const { return int(settings_.schema.scalars.size()); }
+    void save(int level, StateWriter& state);
+    int restore(StateReader& state);
     static std::vector<Unit> unitsOf(const std::vector<LevelItem>& items);
     UnitResult runUnit(std::span<const LevelItem> items, int level);
     void runLeaf(const LevelItem& item, const CellMesh& mesh, UnitResult& result,
@@ -85,6 +104,7 @@ private:
     static Node describe(const CellMesh& cell, Worker& worker);
     void write(UnitResult& result);
 
+    Construction& work_;
     Leaves& leaves_;
     const LevelSettings& settings_;
     TempSpace& space_;
@@ -98,6 +118,7 @@ private:
     NodeIndex nodes_in_level_ = 0;
     uint32_t groups_ = 0;
     LevelCounts counts_;
+    std::string saved_cells_;  // what the last state that was saved means
 };
 
 std::vector<Unit> LevelBuilder::unitsOf(const std::vector<LevelItem>& items) {
@@ -125,7 +146,7 @@ bool LevelBuilder::buildLevel(int level) {
     });
     if (items.empty()) return false;
     const std::vector<Unit> units = unitsOf(items);
-    store_ = std::make_unique<CellStore>(space_, int(settings_.schema.scalars.size()));
+    store_ = std::make_unique<CellStore>(space_, scalars(), cellsOf(level));
     states_.clear();
     nodes_in_level_ = 0;
     writer_.beginLevel(uint32_t(level));
@@ -139,6 +160,38 @@ bool LevelBuilder::buildLevel(int level) {
     below_ = std::move(states_);
     store_below_ = std::move(store_);
     return true;
+}
+
+/// What finished levels leave.
+void LevelBuilder::save(int level, StateWriter& state) {
+    state.put(level);
+    writer_.save(state);
+    store_below_->save(state);
+    std::vector<SavedCell> cells;
+    for (const auto& [id, cell] : below_)
+        cells.push_back({id, cell, cell.blob.store != store_below_.get()});
+    state.put(cells);
+    state.put(groups_);
+    state.put(counts_);
+}
+
+/// The level that is next.
+int LevelBuilder::restore(StateReader& state) {
+    const int level = state.get<int>();
+    writer_.restore(state);
+    saved_cells_ = cellsOf(level);
+    store_below_ = std::make_unique<CellStore>(space_, scalars(), saved_cells_);
+    store_below_->restore(state);
+    std::vector<SavedCell> cells;
+    state.get(cells);
+    for (SavedCell& saved : cells) {
+        saved.state.blob.store =
+            saved.is_leaf ? leaves_.blobs.at(saved.id).store : store_below_.get();
+        below_.emplace(saved.id, saved.state);
+    }
+    state.get(groups_);
+    state.get(counts_);
+    return level - 1;
 }
 
 UnitResult LevelBuilder::runUnit(std::span<const LevelItem> items, int level) {
@@ -253,9 +306,8 @@ void LevelBuilder::write(UnitResult& result) {
 
 }  // namespace
 
-LevelCounts buildLevels(Leaves& leaves, const LevelSettings& settings, TempSpace& space,
-                        ModelWriter& writer, Progress& progress) {
-    return LevelBuilder(leaves, settings, space, writer, progress).run();
+LevelCounts buildLevels(Construction& work, const LevelSettings& settings, Progress& progress) {
+    return LevelBuilder(work, settings, progress).run();
 }
 
 }  // namespace pietra::tetra

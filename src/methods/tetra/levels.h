@@ -3,9 +3,7 @@
 // roots, level by level. Diamonds of a level are independent and run in parallel; results are
 // written in the order of the curve, so the file does not depend on who was first.
 
-#include "coarsen/leaves.h"
-#include "multires/method.h"
-#include "store/model_writer.h"
+#include "construction/construction.h"
 
 namespace pietra::tetra {
 
@@ -23,8 +21,7 @@ struct LevelCounts {
     uint64_t triangles = 0;  ///< stored, over all levels
 };
 
-/// Consumes the leaves.
-LevelCounts buildLevels(Leaves& leaves, const LevelSettings& settings, TempSpace& space,
-                        ModelWriter& writer, Progress& progress);
+/// Consumes the leaves. Goes on from the last level that was saved, where there is one.
+LevelCounts buildLevels(Construction& work, const LevelSettings& settings, Progress& progress);
 
 }  // namespace pietra::tetra
