@@ -47,8 +47,6 @@ def build(mesh, name, options):
                              options.memory, folder=options.folder)
         made["info"] = json.loads(common.pietra("info", model, "--json").stdout)
         told.write_text(json.dumps(made))
-        if mesh.is_relative_to(options.folder) and not options.keep:
-            mesh.unlink()
     return model, json.loads(told.read_text())
 
 
@@ -86,7 +84,6 @@ def main():
     parser.add_argument("--memory", default="1G", help="of construction")
     parser.add_argument("--ram", default="1G", help="of flights")
     parser.add_argument("--frames", type=int, default=300)
-    parser.add_argument("--keep", action="store_true", help="the meshes made here, too")
     parser.add_argument("--page", default=common.ROOT / "src/methods/cluster/README.md",
                         type=pathlib.Path)
     parser.add_argument("--folder", default="bench-output")

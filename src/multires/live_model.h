@@ -9,6 +9,7 @@
 //
 // One thread calls, but for decode().
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -46,10 +47,26 @@ struct LiveChunk {
     uint16_t level = 0;   ///< by how many halvings of the error it is finer than the coarsest
 };
 
+/// What lies between `low` and `high` along two axes, lattice units: of triangles their middles,
+/// `high` excluded.
+struct LiveColumn {
+    std::array<int, 2> axis{0, 1};
+    std::array<int32_t, 2> low{}, high{};
+    bool holds(const Vec3i& a, const Vec3i& b, const Vec3i& c) const {
+        for (size_t i = 0; i < 2; ++i) {
+            const int64_t sum = int64_t(a[axis[i]]) + int64_t(b[axis[i]]) + int64_t(c[axis[i]]);
+            if (sum < 3 * int64_t(low[i]) || sum >= 3 * int64_t(high[i])) return false;
+        }
+        return true;
+    }
+};
+
 struct LiveTask {
     const View* view = nullptr;
     const SeenDepth* seen = nullptr;  ///< what it hides may be coarser; null: nothing is hidden
     double pixels = 1;                ///< what shows as more is refined; 0: all is
+    /// With 0 pixels: all that has to do with what lies in there, and no more than that needs.
+    const LiveColumn* column = nullptr;
     /// For adaption, about; some is always done.
     double milliseconds = std::numeric_limits<double>::infinity();
     bool only_look = false;     ///< nothing is adapted; but what is needed is found

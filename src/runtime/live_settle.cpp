@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <limits>
+
+#include "base/check.h"
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/progress.h"
@@ -38,23 +41,80 @@ std::unique_ptr<LiveModel> openLive(const ModelReader& reader, OpenLive open) {
     return open(reader);
 }
 
-double settle(const ModelReader& reader, LiveModel& model, const View& view, double pixels,
-              size_t most_bytes) {
-    if (model.bytes() > most_bytes)
-        throw MemoryError(fmt::format("the coarsest level needs {}", formatBytes(model.bytes())));
+namespace {
+
+/// False if memory is too small for it.
+bool refine(const ModelReader& reader, LiveModel& model, const LiveTask& task) {
     for (;;) {
         if (Progress::cancelRequested()) throw Interrupted();
-        const LiveFrame& frame =
-            model.adapt({.view = &view, .pixels = pixels, .most_bytes = most_bytes});
+        const LiveFrame& frame = model.adapt(task);
         const std::vector<uint32_t> pages = model.requests(kReadTogether);
         const bool arrived = !pages.empty() && readPages(reader, model, pages);
         if (arrived || frame.busy) continue;
-        if (!frame.short_of_memory) return pixels;
-        if (model.release(most_bytes) > 0) continue;
-        if (pixels == 0)
-            throw MemoryError(fmt::format("all of {} needs more than {}", reader.path(),
-                                          formatBytes(most_bytes)));
+        if (!frame.short_of_memory) return true;
+        if (model.release(task.most_bytes) == 0) return false;
+    }
+}
+
+uint64_t trianglesOf(const LiveModel& model) {
+    uint64_t triangles = 0;
+    for (const LiveChunk& chunk : model.chunks()) triangles += chunk.mesh.triangleCount();
+    return triangles;
+}
+
+void checkRoom(const LiveModel& model, size_t most_bytes) {
+    if (model.bytes() > most_bytes)
+        throw MemoryError(fmt::format("the coarsest level needs {}", formatBytes(model.bytes())));
+}
+
+}  // namespace
+
+double settle(const ModelReader& reader, LiveModel& model, const View& view, double pixels,
+              size_t most_bytes) {
+    CHECK_LT(0, pixels);
+    checkRoom(model, most_bytes);
+    while (!refine(reader, model, {.view = &view, .pixels = pixels, .most_bytes = most_bytes}))
         pixels *= kRaise;
+    return pixels;
+}
+
+void visitColumns(const ModelReader& reader, LiveModel& model, const View& view, size_t most_bytes,
+                  const std::function<void(const LiveColumn&)>& visit) {
+    checkRoom(model, most_bytes);
+    const Box3i& bounds = reader.info().bounds;
+    const Vec3i size = bounds.max - bounds.min;
+    const int thin = size.x < size.y ? (size.x < size.z ? 0 : 2) : (size.y < size.z ? 1 : 2);
+    LiveColumn whole;
+    whole.axis = {(thin + 1) % 3, (thin + 2) % 3};
+    for (size_t i = 0; i < 2; ++i) {
+        whole.low[i] = bounds.min[whole.axis[i]];
+        whole.high[i] = bounds.max[whole.axis[i]] + 1;
+    }
+    std::vector<LiveColumn> left{whole};
+    double most_area = std::numeric_limits<double>::infinity();  // that is tried
+    while (!left.empty()) {
+        const LiveColumn column = left.back();
+        left.pop_back();
+        const std::array<int32_t, 2> wide = {column.high[0] - column.low[0],
+                                             column.high[1] - column.low[1]};
+        const double area = double(wide[0]) * wide[1];
+        if (area <= most_area) {
+            if (refine(reader, model,
+                       {.view = &view, .pixels = 0, .column = &column, .most_bytes = most_bytes})) {
+                visit(column);
+                most_area = 2.5 * area;
+                continue;
+            }
+            most_area = area / 2;
+        }
+        const size_t along = wide[1] > wide[0];
+        if (wide[along] < 2)
+            throw MemoryError(fmt::format("parts of {} need more than {}", reader.path(),
+                                          formatBytes(most_bytes)));
+        LiveColumn first = column, second = column;
+        first.high[along] = second.low[along] = column.low[along] + wide[along] / 2;
+        left.push_back(second);
+        left.push_back(first);
     }
 }
 
@@ -96,9 +156,7 @@ void refineEvenly(const ModelReader& reader, LiveModel& model, uint64_t triangle
     const View view(camera, {1024, 1024}, info.lattice);
     for (double pixels = 64; pixels > 1e-3; pixels /= 2) {
         settle(reader, model, view, pixels, ~size_t(0) / 2);
-        uint64_t count = 0;
-        for (const LiveChunk& chunk : model.chunks()) count += chunk.mesh.triangleCount();
-        if (count > triangles / 2) return;
+        if (trianglesOf(model) > triangles / 2) return;
     }
 }
 

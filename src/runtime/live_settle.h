@@ -3,6 +3,7 @@
 // pictures and coarse looks; the frame path has its loader. Throws MemoryError where the base mesh
 // does not fit, and InputError for pages that cannot be read.
 
+#include <functional>
 #include <vector>
 
 #include "multires/cut.h"
@@ -16,9 +17,16 @@ namespace pietra {
 std::unique_ptr<LiveModel> openLive(const ModelReader& reader, OpenLive open);
 
 /// Raises the tolerance as long as memory is too small; returns what it is then. Throws MemoryError
-/// if all is asked for (0 pixels) and does not fit. Reads on all threads.
+/// if the coarsest level does not fit. Reads on all threads.
 double settle(const ModelReader& reader, LiveModel& model, const View& view, double pixels,
               size_t most_bytes);
+
+/// The full mesh in parts: refines what lies in one column of the model after the other, as many as
+/// memory asks for, and shows it to visit(column), which draws the triangles that the column holds.
+/// Each triangle of the input is in one of them. Throws MemoryError if not even columns of a few
+/// triangles fit, Interrupted, and what reading throws.
+void visitColumns(const ModelReader& reader, LiveModel& model, const View& view, size_t most_bytes,
+                  const std::function<void(const LiveColumn&)>& visit);
 
 /// Of what is drawn now. Within the box of all closed chunks the eye counts as inside.
 bool eyeMayBeInside(const LiveModel& model, const View& view);

@@ -213,6 +213,11 @@ class Shown(VerbTest):
         all_of_it = self.render("all.png", "--pixels", "0", "--cull", "none",
                                 models=("fine.pietra",))
         self.assertEqual(all_of_it["triangles"], full["triangles"])
+        in_parts = self.render("parts.png", "--pixels", "0", "--cull", "none", "--ram", "8M",
+                               models=("fine.pietra",))
+        self.assertGreater(in_parts["patches"], all_of_it["patches"])
+        self.assertEqual(in_parts["triangles"], full["triangles"])
+        self.assertEqual(self.read("parts.png"), self.read("all.png"))
         self.assertLess(fine["triangles"], full["triangles"] / 2)
         self.assertEqual(fine["tolerance_px"], 1)
         self.assertEqual((full["errors_proven"], fine["errors_proven"]), (True, True))

@@ -38,4 +38,22 @@ SplitView wholeSplitView(bool all) {
     return view;
 }
 
+SplitView columnView(const LiveColumn& column, const Lattice& lattice, const SplitGrid& grid) {
+    // The pyramid's four sides are the column's: whole numbers times a power of two, so that
+    // nothing rounds, and so large that no error outweighs what lies outside.
+    constexpr float kSteep = 0x1p80f;
+    SplitView view = wholeSplitView(true);
+    for (size_t i = 0; i < 2; ++i) {
+        const size_t axis = size_t(column.axis[i]);
+        const auto cell = [&](int32_t x) {
+            return ((x >> lattice.shift) - grid.origin[int(axis)]) >> grid.shift;
+        };
+        view.side[2 * i][axis] = kSteep;
+        view.at_eye[2 * i] = float(cell(column.low[i])) * kSteep;
+        view.side[2 * i + 1][axis] = -kSteep;
+        view.at_eye[2 * i + 1] = -float(cell(column.high[i]) + 1) * kSteep;
+    }
+    return view;
+}
+
 }  // namespace pietra::pmesh

@@ -16,6 +16,7 @@
 #include "geometry/bounds.h"
 #include "methods/pmesh/occlusion.h"
 #include "methods/pmesh/split_node.h"
+#include "multires/live_model.h"
 #include "multires/view.h"
 
 namespace pietra::pmesh {
@@ -90,5 +91,7 @@ SplitView splitView(const View& view, const Lattice& lattice, const SplitGrid& g
                     const Box3i& bounds);
 /// All splits, or none.
 SplitView wholeSplitView(bool all);
+/// All that have to do with anything in a column (multires/live_model.h).
+SplitView columnView(const LiveColumn& column, const Lattice& lattice, const SplitGrid& grid);
 
 }  // namespace pietra::pmesh

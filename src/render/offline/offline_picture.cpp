@@ -38,6 +38,21 @@ struct SceneModel {
     double pixelsOf(NodeIndex i) const { return view.pixelsOf(node(i)); }
 };
 
+/// The mesh's triangles that the column holds. False if there are none.
+bool keepHeld(Mesh& mesh, const LiveColumn& column) {
+    size_t kept = 0;
+    for (size_t t = 0; t < mesh.triangleCount(); ++t) {
+        const auto& [a, b, c] = mesh.triangle[t];
+        if (!column.holds(mesh.position[a], mesh.position[b], mesh.position[c])) continue;
+        mesh.triangle[kept] = mesh.triangle[t];
+        if (!mesh.edge_class.empty()) mesh.edge_class[kept] = mesh.edge_class[t];
+        ++kept;
+    }
+    mesh.triangle.resize(kept);
+    if (!mesh.edge_class.empty()) mesh.edge_class.resize(kept);
+    return kept > 0;
+}
+
 class OfflineRenderer {
 public:
     OfflineRenderer(std::span<const ModelReader* const> models, const Camera& camera,
@@ -150,20 +165,33 @@ private:
         drawer.setModel(model.view, model.reader->info().lattice);
         const Stopwatch watch;
         const std::unique_ptr<LiveModel> live = openLive(*model.reader, settings_.open_live);
+        double& tolerance = result_.statistics.tolerance_px;
+        if (settings_.pixels > 0) {
+            tolerance = std::max(
+                tolerance, settle(*model.reader, *live, model.view, settings_.pixels, live_bytes_));
+            addChunks(m, *live, nullptr, drawer);
+        } else {
+            visitColumns(*model.reader, *live, model.view, live_bytes_,
+                         [&](const LiveColumn& column) { addChunks(m, *live, &column, drawer); });
+        }
+        result_.statistics.load_ms += watch.ms();
+    }
+
+    /// Those of a column have just the triangles that it holds.
+    void addChunks(uint32_t m, const LiveModel& live, const LiveColumn* column,
+                   BatchDrawer& drawer) {
+        const SceneModel& model = models_[m];
+        if (!live.faults().empty())
+            throw InputError(model.reader->path(), "", live.faults().front());
         OfflineStatistics& statistics = result_.statistics;
-        statistics.tolerance_px =
-            std::max(statistics.tolerance_px,
-                     settle(*model.reader, *live, model.view, settings_.pixels, live_bytes_));
-        if (!live->faults().empty())
-            throw InputError(model.reader->path(), "", live->faults().front());
         statistics.resident_bytes =
-            std::max(statistics.resident_bytes, fixed_bytes_ + live->bytes());
-        statistics.load_ms += watch.ms();
+            std::max(statistics.resident_bytes, fixed_bytes_ + live.bytes());
         std::vector<DrawPatch> list;
-        listChunks(*live, m, model.view, settings_.culling, eyeMayBeInside(*live, model.view),
+        listChunks(live, m, model.view, settings_.culling, eyeMayBeInside(live, model.view),
                    settings_.shade.show == Show::kError, list);
         for (DrawPatch& patch : list) {
             std::vector<Mesh> mesh{*patch.mesh};
+            if (column != nullptr && !keepHeld(mesh[0], *column)) continue;
             patch.mesh = mesh.data();
             drawer.add(std::move(mesh), {patch});
         }

@@ -116,7 +116,10 @@ size_t LiveSplits::drawable(uint64_t triangles) const {
 }
 
 const LiveFrame& LiveSplits::adapt(const LiveTask& task) {
-    SplitView view = viewOf(*task.view, task.pixels);
+    const SplitForest& forest = nodes_.forest();
+    SplitView view = task.column != nullptr
+                         ? columnView(*task.column, forest.lattice, forest.grid)
+                         : viewOf(*task.view, task.pixels);
     if (task.seen != nullptr && task.pixels > 0)
         view.occlusion =
             std::make_shared<Occlusion>(*task.seen, nodes_.forest().lattice, nodes_.forest().grid);
