@@ -74,6 +74,9 @@ InterfaceTable::InterfaceTable(const Octree& octree, const Leaves& leaves, Budge
         leaf_.push_back(leaf);
     }
     for (size_t v = 0; v < code_.size(); ++v) use_begin_[v + 1] += use_begin_[v];
+    memory_ = {};
+    memory_ = budget.reserve(12 * code_.size() + 4 * leaf_.size(),
+                             "the interfaces of the octree's cells");
 }
 
 uint32_t InterfaceTable::find(const Vec3i& p) const {

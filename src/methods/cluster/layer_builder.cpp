@@ -9,11 +9,11 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
-#include "coarsen/key_map.h"
 #include "coarsen/mesh_joiner.h"
 #include "geometry/enclosing_ball.h"
 #include "methods/cluster/cell_layer.h"
 #include "methods/cluster/fallback.h"
+#include "methods/cluster/free_points.h"
 #include "methods/cluster/layer_step.h"
 #include "store/page_codec.h"
 
@@ -87,60 +87,6 @@ float faceSize(const PolygonMesh& polygons) {
     for (const FaceShape& shape : polygons.shape) area += shape.area;
     return polygons.faceCount() == 0 ? 0 : float(std::sqrt(area / polygons.faceCount()));
 }
-
-/// Lattice points of a cell's cube that are nobody's vertices.
-class FreePoints {
-public:
-    FreePoints(CellId cell, int shift, const InterfaceTable& table) : shift_(shift), table_(table) {
-        const int bits = kLatticeBits - depthOf(cell);
-        if (cell > 1) {
-            const Vec3i corner = cubeCorner(cell);
-            low_ = corner;
-            high_ = glm::min(corner + ((1 << bits) - 1), Vec3i(kLatticeMax));
-        }
-    }
-    Box3i room() const { return {low_, high_}; }
-    void occupy(const std::vector<Vec3i>& points) {
-        for (const Vec3i& p : points) taken_.insert(latticeKey(p), 0);
-    }
-    /// Moves a point to the lattice's step, and takes it; false where it is not free.
-    bool take(Vec3i& p) {
-        p = snapToShift(p, shift_);
-        return p == glm::clamp(p, low_, high_) && table_.find(p) == kNone &&
-               taken_.insert(latticeKey(p), 0).second;
-    }
-    /// Near another one, and none given before.
-    Vec3i near(const Vec3i& wanted) {
-        const int32_t step = 1 << shift_;
-        const Vec3i first = glm::clamp(snapToShift(wanted, shift_), low_, high_) >> shift_
-                                                                                        << shift_;
-        for (int32_t reach = 0; reach <= kLatticeMax; reach += step)
-            for (int32_t x = -reach; x <= reach; x += step)
-                for (int32_t y = -reach; y <= reach; y += step)
-                    for (int32_t z = -reach; z <= reach; z += step) {
-                        if (std::max({std::abs(x), std::abs(y), std::abs(z)}) != reach) continue;
-                        const Vec3i p = first + Vec3i(x, y, z);
-                        if (p != glm::clamp(p, low_, high_) || table_.find(p) != kNone) continue;
-                        if (taken_.insert(latticeKey(p), 0).second) return p;
-                    }
-        CHECK(false);
-        return wanted;
-    }
-
-private:
-    static Vec3i cubeCorner(CellId cell) {
-        Vec3i corner(0);
-        for (int bit = kLatticeBits - depthOf(cell); cell > 1; cell >>= 3, ++bit)
-            corner |= Vec3i(int32_t(cell & 1), int32_t(cell >> 1 & 1), int32_t(cell >> 2 & 1))
-                      << bit;
-        return corner;
-    }
-
-    int shift_;
-    const InterfaceTable& table_;
-    Vec3i low_{0}, high_{kLatticeMax};
-    KeyMap taken_;
-};
 
 class Builder {
 public:
@@ -358,28 +304,21 @@ LayerStep Builder::makeLayer(const CellStep& step, const CellLayer& base) const 
         if (base.polygons.interface_[v])
             removed[v] = removals_->isRemoved(table_->find(base.polygons.position[v]));
     const bool first = isFirst(step);
-    FreePoints points(step.cell, settings_.shift, *table_);
-    LayerStep next = nextLayer(base.polygons, base.triangles, removed,
-                               first ? settings_.first_faces : settings_.faces, points.room(),
-                               settings_.clustering);
-    if (!next.moved.empty() || !next.triangles.to_free.empty()) {
-        points.occupy(base.triangles.mesh.position);
-        points.occupy(base.inner.position);
-    }
-    for (const uint32_t v : next.moved) {
-        Vec3i& p = next.polygons.position[v];
-        if (!points.take(p)) p = base.polygons.position[next.polygons.name[v]];
-        next.triangles.mesh.position[v] = p;
-    }
+    const Box3i cube = cubeOf(step.cell);
+    LayerStep next =
+        nextLayer(base.polygons, base.triangles, removed,
+                  first ? settings_.first_faces : settings_.faces, cube, settings_.clustering);
+    FreePoints points(cube, settings_.shift,
+                      [&](const Vec3i& p) { return table_->find(p) != kNone; });
+    points.occupy(base.triangles.mesh.position);
+    points.occupy(base.inner.position);
+    points.settle(next);
     // Above the leaves, cells are to be about as large as theirs are in their last layer.
     const bool is_leaf = step.cell == step.below[0];
     size_t target = base.triangles.mesh.triangleCount() / 4;
     if (!is_leaf) target = std::min<size_t>(target, settings_.leaf_triangles / 8);
     if (next.triangles.mesh.triangleCount() > target + target / 2) dropComponents(next, target);
-    for (const uint32_t v : next.triangles.to_free) {
-        Vec3i& p = next.triangles.mesh.position[v];
-        p = points.near(p);
-    }
+    points.placeStars(next.triangles);
     return next;
 }
 

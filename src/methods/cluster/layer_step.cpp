@@ -9,7 +9,6 @@
 #include "geometry/lattice.h"
 #include "methods/cluster/anchors.h"
 #include "methods/cluster/interfaces.h"
-#include "methods/cluster/placement.h"
 #include "simplify/deviation_direction.h"
 
 namespace pietra::cluster {

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "geometry/bounds.h"
 #include "methods/cluster/face_clusters.h"
+#include "methods/cluster/placement.h"
 #include "methods/cluster/triangulation.h"
 #include "simplify/deviation.h"
 
@@ -18,9 +18,8 @@ struct LayerStep {
     PolygonMesh polygons;
     /// Those of `to_free` have still to be moved to free points, before anything is bounded.
     LayerTriangles triangles;
-    /// Vertices of `polygons` that were moved to where others might lie: the caller moves them
-    /// back, in both meshes, where so.
-    std::vector<uint32_t> moved;
+    /// Vertices of both meshes that were moved to where others might lie (FreePoints::settle).
+    std::vector<MovedAnchor> moved;
     /// One a triangle of the layer below: where to look for what became of it.
     std::vector<uint32_t> triangle_map;
 };

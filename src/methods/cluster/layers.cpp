@@ -1,12 +1,12 @@
 #include "methods/cluster/layers.h"
 
 #include <algorithm>
-#include <unordered_set>
 
 #include "base/check.h"
 #include "base/parallel.h"
 #include "base/stopwatch.h"
 #include "geometry/lattice.h"
+#include "methods/cluster/free_points.h"
 #include "methods/cluster/layer_step.h"
 #include "methods/cluster/octree_cells.h"
 
@@ -39,33 +39,6 @@ PolygonMesh cellMesh(const Mesh& model, std::span<const uint32_t> triangles,
     }
     return polygonsOf(mesh, names, at_interface, irregular);
 }
-
-/// Lattice points that are no vertices.
-class FreePoints {
-public:
-    explicit FreePoints(const std::vector<Vec3i>& vertices) : vertices_(vertices) {}
-    /// False where it is not free.
-    bool take(const Vec3i& p) {
-        if (taken_.empty())
-            for (const Vec3i& other : vertices_) taken_.insert(latticeKey(other));
-        return taken_.insert(latticeKey(p)).second;
-    }
-    /// Near another one, and none given before.
-    Vec3i near(const Vec3i& wanted) {
-        for (int32_t reach = 0;; ++reach)
-            for (int32_t x = -reach; x <= reach; ++x)
-                for (int32_t y = -reach; y <= reach; ++y)
-                    for (int32_t z = -reach; z <= reach; ++z) {
-                        const Vec3i p =
-                            glm::clamp(wanted + Vec3i(x, y, z), Vec3i(0), Vec3i(kLatticeMax));
-                        if (take(p)) return p;
-                    }
-    }
-
-private:
-    const std::vector<Vec3i>& vertices_;
-    std::unordered_set<uint64_t> taken_;  // filled when it is first asked for
-};
 
 /// Bounds of the strips' distance to layer 0 by what a cell has below the layer at which they
 /// appear: by the first of a strip's cells and by the second.
@@ -156,7 +129,9 @@ LayeredPiece buildLayers(const Mesh& mesh, const CellTriangles& cells,
     std::vector<FaceBounds> bounds(count);
     PerThread<Deviation> deviation;
     std::array<std::vector<float>, 2> strip_bound;
-    FreePoints free_points(mesh.position);
+    const Box3i room{Vec3i(0), Vec3i(kLatticeMax)};
+    FreePoints free_points(room, 0);
+    free_points.occupy(mesh.position);
     piece.cell.resize(count);
     parallelFor(count, [&](size_t c) {
         current[c] = cellMesh(mesh, cells.of_cell[c], interfaces);
@@ -179,20 +154,12 @@ LayeredPiece buildLayers(const Mesh& mesh, const CellTriangles& cells,
         const uint32_t faces_each = layer == 1 ? settings.first_faces : settings.faces;
         parallelFor(count, [&](size_t c) {
             step[c] = nextLayer(current[c], piece.cell[c].layer.back(), interfaces.justRemoved(),
-                                faces_each, {Vec3i(0), Vec3i(kLatticeMax)}, settings.clustering);
-            current[c] = std::move(step[c].polygons);
+                                faces_each, room, settings.clustering);
         });
         for (size_t c = 0; c < count; ++c) {
-            LayerStep& one = step[c];
-            for (const uint32_t v : one.moved) {
-                Vec3i& p = current[c].position[v];
-                if (!free_points.take(p)) p = mesh.position[current[c].name[v]];
-                one.triangles.mesh.position[v] = p;
-            }
-            for (const uint32_t v : one.triangles.to_free) {
-                Vec3i& p = one.triangles.mesh.position[v];
-                p = free_points.near(p);
-            }
+            free_points.settle(step[c]);
+            free_points.placeStars(step[c].triangles);
+            current[c] = std::move(step[c].polygons);
         }
         spend(piece.seconds.faces);
         std::vector<ListedStrips> own(count);

@@ -14,6 +14,15 @@ bool comesBefore(CellId a, CellId b) {
 
 }  // namespace
 
+Box3i cubeOf(CellId cell) {
+    const int bits = kLatticeBits - depthOf(cell);
+    if (cell == 1) return {Vec3i(0), Vec3i(kLatticeMax)};
+    Vec3i corner(0);
+    for (int bit = bits; cell > 1; cell >>= 3, ++bit)
+        corner |= Vec3i(int32_t(cell & 1), int32_t(cell >> 1 & 1), int32_t(cell >> 2 & 1)) << bit;
+    return {corner, glm::min(corner + ((1 << bits) - 1), Vec3i(kLatticeMax))};
+}
+
 Octree::Octree(std::vector<CellId> leaves) : leaves_(std::move(leaves)) {
     for (const CellId leaf : leaves_) deepest_ = std::max(deepest_, depthOf(leaf));
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "coarsen/cell_path.h"
+#include "geometry/bounds.h"
 
 namespace pietra::cluster {
 
@@ -18,6 +19,9 @@ inline constexpr int kLocalLayers = 3;
 inline int depthOf(CellId cell) {
     return cellLevel(cell) / 3 + 1;
 }
+
+/// Of lattice points.
+Box3i cubeOf(CellId cell);
 
 /// A cell that gets a new layer, and those whose layers below it begins with: itself or children.
 struct CellStep {

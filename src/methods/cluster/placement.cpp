@@ -16,7 +16,7 @@ constexpr double kReach = 0.5;
 
 }  // namespace
 
-std::vector<uint32_t> moveAnchors(PolygonMesh& mesh, const Box3i& room) {
+std::vector<MovedAnchor> moveAnchors(PolygonMesh& mesh, const Box3i& room) {
     // By vertex: the planes' normal equations, and how far the next vertex is.
     struct Place {
         glm::dmat3 a{0};
@@ -43,7 +43,7 @@ std::vector<uint32_t> moveAnchors(PolygonMesh& mesh, const Box3i& room) {
             place.nearest_sq = std::min(place.nearest_sq, glm::dot(edge, edge));
         }
     }
-    std::vector<uint32_t> moved;
+    std::vector<MovedAnchor> moved;
     for (uint32_t v = 0; v < mesh.vertexCount(); ++v) {
         Place& place = places[v];
         if (fixed[v] || !(place.area > 0)) continue;
@@ -53,8 +53,8 @@ std::vector<uint32_t> moveAnchors(PolygonMesh& mesh, const Box3i& room) {
         if (length > most) way *= most / length;
         const Vec3i p(glm::floor(Vec3d(mesh.position[v]) + way + 0.5));
         if (p == mesh.position[v] || p != glm::clamp(p, room.min, room.max)) continue;
+        moved.push_back({v, mesh.position[v]});
         mesh.position[v] = p;
-        moved.push_back(v);
     }
     return moved;
 }

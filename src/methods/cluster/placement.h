@@ -10,9 +10,14 @@
 
 namespace pietra::cluster {
 
+struct MovedAnchor {
+    uint32_t vertex;
+    Vec3i from;
+};
+
 /// Moves vertices that lie within the cell, whose faces close around them, to such places within
 /// `room`, at most half the way to the nearest vertex. Returns which moved, increasing; their names
 /// stay. Linear.
-std::vector<uint32_t> moveAnchors(PolygonMesh& mesh, const Box3i& room);
+std::vector<MovedAnchor> moveAnchors(PolygonMesh& mesh, const Box3i& room);
 
 }  // namespace pietra::cluster

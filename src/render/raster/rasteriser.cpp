@@ -71,6 +71,7 @@ struct Rasteriser::State {
     void transform(BatchPatch& patch) const;
     std::vector<DrawChunk> makeChunks() const;
     void fit(DrawChunk& chunk) const;
+    ScreenPolygon clipped(const DrawChunk& chunk, uint32_t i) const;
     void drawChunk(const DrawChunk& chunk, const VisibilityTile& tile) const;
     void drawUnhidden(const std::vector<DrawChunk>& chunks, const VisibilityTile& tile,
                       std::vector<uint32_t>& list);
@@ -185,24 +186,36 @@ void Rasteriser::State::transform(BatchPatch& entry) const {
              (bounds.max_x >> kSubpixelBits) + 1, (bounds.max_y >> kSubpixelBits) + 1});
 }
 
-/// To the images of its own vertices.
+/// To the images of its own vertices, and of what is left of triangles that have to be clipped:
+/// near the eye these may be few, and every tile draws what might be anywhere.
 void Rasteriser::State::fit(DrawChunk& chunk) const {
     int32_t min_x = std::numeric_limits<int32_t>::max(),
             max_x = std::numeric_limits<int32_t>::lowest();
     int32_t min_y = min_x, max_y = max_x;
     float nearest = 0;
-    for (uint32_t i = 0; i < chunk.count; ++i)
-        for (const uint32_t index : chunk.patch->triangle()[chunk.first + i]) {
-            const ScreenVertex& v = chunk.patch->vertex[index];
-            if (v.x == kNoImage) return;
-            min_x = std::min(min_x, v.x);
-            max_x = std::max(max_x, v.x);
-            min_y = std::min(min_y, v.y);
-            max_y = std::max(max_y, v.y);
-            nearest = std::max(nearest, v.inv_depth);
+    const auto add = [&](const auto& point) {
+        min_x = std::min(min_x, point.x);
+        max_x = std::max(max_x, point.x);
+        min_y = std::min(min_y, point.y);
+        max_y = std::max(max_y, point.y);
+        nearest = std::max(nearest, point.inv_depth);
+    };
+    for (uint32_t i = 0; i < chunk.count; ++i) {
+        const Triangle& triangle = chunk.patch->triangle()[chunk.first + i];
+        bool whole = true;
+        for (const uint32_t index : triangle) whole &= chunk.patch->vertex[index].x != kNoImage;
+        if (whole) {
+            for (const uint32_t index : triangle) add(chunk.patch->vertex[index]);
+            continue;
         }
-    chunk.box = screen().intersected({min_x >> kSubpixelBits, min_y >> kSubpixelBits,
-                                      (max_x >> kSubpixelBits) + 1, (max_y >> kSubpixelBits) + 1});
+        const ScreenPolygon left = clipped(chunk, i);
+        for (int k = 0; k < left.count; ++k) add(left.point[size_t(k)]);
+    }
+    chunk.box =
+        max_x < min_x
+            ? PixelBox{}
+            : screen().intersected({min_x >> kSubpixelBits, min_y >> kSubpixelBits,
+                                    (max_x >> kSubpixelBits) + 1, (max_y >> kSubpixelBits) + 1});
     chunk.nearest = nearest;
 }
 
@@ -218,16 +231,26 @@ std::vector<DrawChunk> Rasteriser::State::makeChunks() const {
     }
     parallelForSlices(chunks.size(), 16, [&](size_t begin, size_t end) {
         for (size_t i = begin; i < end; ++i)
-            if (chunks[i].count < chunks[i].patch->mesh().triangleCount()) fit(chunks[i]);
+            if (!chunks[i].patch->whole ||
+                chunks[i].count < chunks[i].patch->mesh().triangleCount())
+                fit(chunks[i]);
     });
     std::erase_if(chunks, [](const DrawChunk& chunk) { return chunk.box.empty(); });
     return chunks;
 }
 
+/// Its `i`-th triangle.
+ScreenPolygon Rasteriser::State::clipped(const DrawChunk& chunk, uint32_t i) const {
+    const Triangle& t = chunk.patch->triangle()[chunk.first + i];
+    const std::vector<Vec3i>& position = chunk.patch->mesh().position;
+    return clipTriangle(batch.model[chunk.patch->model].projection,
+                        {position[t[0]], position[t[1]], position[t[2]]});
+}
+
 void Rasteriser::State::drawChunk(const DrawChunk& chunk, const VisibilityTile& tile) const {
     const BatchPatch& patch = *chunk.patch;
-    thread_local std::vector<uint32_t> clipped;
-    clipped.clear();
+    thread_local std::vector<uint32_t> to_clip;
+    to_clip.clear();
     prefetchBytes(patch.vertex, patch.mesh().vertexCount() * sizeof(ScreenVertex));
     const PixelBox box = chunk.box.intersected(tile.box);
     for (int32_t y = box.y0; y < box.y1; ++y)
@@ -236,12 +259,9 @@ void Rasteriser::State::drawChunk(const DrawChunk& chunk, const VisibilityTile& 
     drawTriangles(tile,
                   {patch.triangle() + chunk.first, chunk.count, chunk.firstNumber(), patch.vertex,
                    patch.both_sides},
-                  clipped);
-    for (const uint32_t i : clipped) {
-        const Triangle& t = patch.triangle()[chunk.first + i];
-        const std::vector<Vec3i>& position = patch.mesh().position;
-        const ScreenPolygon p = clipTriangle(batch.model[patch.model].projection,
-                                             {position[t[0]], position[t[1]], position[t[2]]});
+                  to_clip);
+    for (const uint32_t i : to_clip) {
+        const ScreenPolygon p = clipped(chunk, i);
         for (int k = 2; k < p.count; ++k)
             drawTriangle(tile, {p.point[0], p.point[k - 1], p.point[k]}, patch.both_sides,
                          chunk.firstNumber() + i);
