@@ -65,11 +65,6 @@ public:
         for (uint32_t h = 0; h < polygons.halfEdgeCount(); ++h)
             joined_.add(polygons.corner[h], polygons.end(h));
         out_.mesh.position = polygons.position;
-        normal_at_.resize(polygons.vertexCount(), Vec3f(0));
-        for (uint32_t h = 0; h < polygons.halfEdgeCount(); ++h)
-            normal_at_[polygons.corner[h]] += Vec3f(polygons.shape[polygons.face[h]].normal);
-        for (Vec3f& n : normal_at_)
-            if (const float length = glm::length(n); length > 0) n /= length;
     }
 
     LayerTriangles run() {
@@ -154,12 +149,7 @@ private:
             r(polygons_.position[c.vertex]);
         const Vec3d pq = q - p, pr = r - p, qr = r - q;
         const double sides = glm::dot(pq, pq) + glm::dot(pr, pr) + glm::dot(qr, qr);
-        const double length = glm::length(pr);
-        const double lean = std::abs(glm::dot(Vec3d(normal_at_[a.vertex]), pr)) +
-                            std::abs(glm::dot(Vec3d(normal_at_[c.vertex]), pr));
-        static const double kW = getenv("LW") ? atof(getenv("LW")) : 0;
-        const double quality =
-            glm::dot(glm::cross(pq, pr), normal_) / sides - (length > 0 ? kW * lean / length : 0);
+        const double quality = glm::dot(glm::cross(pq, pr), normal_) / sides;
         if (turn(a, b, c) <= 0) return quality + 2 * kFolded;
         for (size_t j = 0; j + 3 < n; ++j) {
             const Corner& d = corner_[(i + 2 + j) % n];
@@ -203,10 +193,9 @@ private:
     LayerTriangles out_;
     uint32_t face_ = 0;
     Vec3d normal_{0};
-    std::vector<Vec3f> normal_at_;  // of vertices
-    std::array<int, 2> across_{};   // the axes that are left when projected
-    bool folds_ = false;            // some ear does
-    std::vector<Corner> corner_;    // what is left of the face
+    std::array<int, 2> across_{};  // the axes that are left when projected
+    bool folds_ = false;           // some ear does
+    std::vector<Corner> corner_;   // what is left of the face
     std::vector<std::array<Corner, 3>> ears_;
     std::vector<std::pair<uint32_t, uint32_t>> diagonals_;
 };
