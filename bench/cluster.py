@@ -67,7 +67,7 @@ def fly(model, select, cull, options):
     frame_count = options.frames if cull == "all" else options.frames // 5
     made = common.report("bench", model, "--path", "inspection", "--size", "1024x1024", "--pixels",
                          1, "--select", select, "--cull", cull, "--frames", frame_count, "--ram",
-                         options.ram, folder=options.folder)
+                         options.ram, "--only-fly", folder=options.folder)
     frames = made["frames"]
     mean = sum(frame["ms"] for frame in frames) / len(frames)
     return {"fps": 1000 / mean, "setup": made["summary"]["first_image_ms"] / 1000,

@@ -59,7 +59,7 @@ private:
     CullOption cull_;
     std::string prefetch_ = "on";
     uint64_t ram_ = uint64_t(1) << 30, vram_ = uint64_t(1) << 30;
-    bool cold_ = false;
+    bool only_fly_ = false, cold_ = false;
     std::string html_;
     std::optional<uint64_t> jobs_;
 };
@@ -111,6 +111,9 @@ void BenchVerb::declare(OptionSet& options) {
                    "Load what views to come will need, too.");
     options.size("--ram", ram_, "Most memory for what is loaded.");
     declareVram(options, vram_);
+    options.flag("--only-fly", only_fly_,
+                 "Leave out what is measured after the flight, in as much time again: the same "
+                 "views with everything loaded, and as static lists.");
     options.flag("--cold", cold_, "Drop the system's cache of the files, and fly in real time.");
     options.text("--html", "R.html", html_,
                  "Write a page with graphs, too; for it the path is flown again without drawing "
@@ -140,7 +143,7 @@ FlightSettings BenchVerb::settings(const ModelFiles& files, const CameraPath& pa
                     : renderer_ == "cpu" ? Draw::kCpu
                                          : Draw::kNothing;
     settings.vram_bytes = size_t(vram_);
-    settings.compare = settings.draw != Draw::kNothing;
+    settings.compare = settings.draw != Draw::kNothing && !only_fly_;
     settings.real_time = cold_;
     settings.scene.ram_bytes = size_t(ram_);
     settings.scene.open_live = openLive;
@@ -227,7 +230,7 @@ int BenchVerb::run(const RunContext& context) {
     const CameraPath camera_path = path(files);
     FlightSettings flight = settings(files, camera_path);
     flight.gl_messages = glMessages(context.common);
-    const bool variants = !html_.empty() && flight.compare;
+    const bool variants = !html_.empty() && flight.draw != FlightSettings::Draw::kNothing;
     context.progress.setStages(variants ? 3 : 1);
     record.flight = flyOnce(files, camera_path, flight, "fly", context.progress);
     record.peak_bytes = peakResidentBytes();
