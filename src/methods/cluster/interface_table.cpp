@@ -53,6 +53,7 @@ InterfaceTable::InterfaceTable(const Octree& octree, const Leaves& leaves, Budge
         const std::lock_guard lock(mutex);
         code_.insert(code_.end(), beyond.begin(), beyond.end());
     });
+    // A use of a vertex: more than what remains of it here, for what layers list of them.
     memory_ = budget.reserve(32 * code_.size(), "the interfaces of the octree's cells");
     sortUnique(code_);
     code_.shrink_to_fit();
@@ -74,9 +75,6 @@ InterfaceTable::InterfaceTable(const Octree& octree, const Leaves& leaves, Budge
         leaf_.push_back(leaf);
     }
     for (size_t v = 0; v < code_.size(); ++v) use_begin_[v + 1] += use_begin_[v];
-    memory_ = {};
-    memory_ = budget.reserve(12 * code_.size() + 4 * leaf_.size(),
-                             "the interfaces of the octree's cells");
 }
 
 uint32_t InterfaceTable::find(const Vec3i& p) const {
@@ -157,7 +155,12 @@ void Removals::report(CellId cell, const PolygonMesh& polygons,
     for (const Candidate& c : own)
         leaves[c.vertex] = may_leave_[number[c.vertex]][side[c.vertex]] = 1;
     // A face may lose several corners: as no two are neighbours, and not both neighbours of one
-    // are pinned, three stay. Where faces merge around one, nothing else leaves them.
+    // are pinned, three stay. Where faces merge around one, nothing else leaves them. Neighbours,
+    // which most of these are, choose() knows.
+    const auto areNeighbours = [&](uint32_t p, uint32_t q) {
+        const Outline& outline = outline_[number[p]][side[p]];
+        return number[q] == outline.before || number[q] == outline.after;
+    };
     std::vector<std::array<uint32_t, 2>> conflicts;
     std::vector<uint32_t> at_face;
     for (uint32_t f = 0; f < polygons.faceCount(); ++f) {
@@ -166,7 +169,8 @@ void Removals::report(CellId cell, const PolygonMesh& polygons,
             if (leaves[polygons.corner[h]]) at_face.push_back(polygons.corner[h]);
         for (const uint32_t p : at_face)
             for (const uint32_t q : at_face)
-                if (p != q && (corners.at(p).size() > 1 || corners.at(q).size() > 1))
+                if (p != q && !areNeighbours(p, q) &&
+                    (corners.at(p).size() > 1 || corners.at(q).size() > 1))
                     conflicts.push_back({number[p], number[q]});
     }
     const std::lock_guard lock(mutex_);
