@@ -31,17 +31,24 @@ public:
     /// After the writer has finished: sizes are added.
     void finish(BuildReport& report);
     /// From where the method is in its work, should it be interrupted; where it is not worth it, or
-    /// nothing is kept, only says no. Spills that `write` saves have been given names.
+    /// nothing is kept, does nothing. Spills that `write` saves have been given names: that of
+    /// `spill` goes when the next state is saved, which must have another.
     template <class Write>
-    bool savedState(Write&& write) {
-        if (!checkpoint.isDue()) return false;
+    void saveState(const std::string& spill, Write&& write) {
+        if (!checkpoint.isDue()) return;
         saveInput();
         StateWriter state;
+        state.put(spill);
         write(state);
         checkpoint.save(kMethodPart, state);
-        return true;
+        if (!saved_spill_.empty()) checkpoint.remove(saved_spill_);
+        saved_spill_ = spill;
     }
-    std::optional<StateReader> stateToResume() const { return checkpoint.load(kMethodPart); }
+    std::optional<StateReader> stateToResume() {
+        auto state = checkpoint.load(kMethodPart);
+        if (state) state->get(saved_spill_);
+        return state;
+    }
 
 private:
     static constexpr const char* kMethodPart = "method";
@@ -56,6 +63,7 @@ private:
     Budget budget_;
     std::vector<std::string> notes_;  ///< of the source
     bool input_saved_ = false;
+    std::string saved_spill_;  ///< what the last state that was saved means
 
 public:
     Checkpoint checkpoint;

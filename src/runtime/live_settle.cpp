@@ -56,12 +56,6 @@ bool refine(const ModelReader& reader, LiveModel& model, const LiveTask& task) {
     }
 }
 
-uint64_t trianglesOf(const LiveModel& model) {
-    uint64_t triangles = 0;
-    for (const LiveChunk& chunk : model.chunks()) triangles += chunk.mesh.triangleCount();
-    return triangles;
-}
-
 void checkRoom(const LiveModel& model, size_t most_bytes) {
     if (model.bytes() > most_bytes)
         throw MemoryError(fmt::format("the coarsest level needs {}", formatBytes(model.bytes())));
@@ -156,7 +150,9 @@ void refineEvenly(const ModelReader& reader, LiveModel& model, uint64_t triangle
     const View view(camera, {1024, 1024}, info.lattice);
     for (double pixels = 64; pixels > 1e-3; pixels /= 2) {
         settle(reader, model, view, pixels, ~size_t(0) / 2);
-        if (trianglesOf(model) > triangles / 2) return;
+        uint64_t count = 0;
+        for (const LiveChunk& chunk : model.chunks()) count += chunk.mesh.triangleCount();
+        if (count > triangles / 2) return;
     }
 }
 

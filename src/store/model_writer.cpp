@@ -71,22 +71,22 @@ ModelWriter::ModelWriter(const std::string& path, bool force, const std::string&
       pages_(temp_dir, kept, "pages"),
       nodes_(temp_dir, kept, "nodes") {}
 
+/// The same list for both ways.
+template <class Writer, class Visit>
+void ModelWriter::forEachNumber(Writer& writer, Visit&& visit) {
+    for (auto& level : writer.levels_) {
+        visit(level.pages_offset), visit(level.nodes_offset), visit(level.pages_bytes);
+        visit(level.nodes), visit(level.pages), visit(level.blocks);
+    }
+    visit(writer.level_), visit(writer.page_bytes_), visit(writer.node_count_);
+    visit(writer.triangles_);
+}
+
 void ModelWriter::save(StateWriter& state) {
     pages_.save(state);
     nodes_.save(state);
     state.put(levels_.size());
-    for (const Level& level : levels_) {
-        state.put(level.pages_offset);
-        state.put(level.nodes_offset);
-        state.put(level.pages_bytes);
-        state.put(level.nodes);
-        state.put(level.pages);
-        state.put(level.blocks);
-    }
-    state.put(level_);
-    state.put(page_bytes_);
-    state.put(node_count_);
-    state.put(triangles_);
+    forEachNumber(*this, [&](const auto& value) { state.put(value); });
 }
 
 void ModelWriter::restore(StateReader& state) {
@@ -94,18 +94,7 @@ void ModelWriter::restore(StateReader& state) {
     pages_.restore(state);
     nodes_.restore(state);
     levels_.resize(state.get<size_t>());
-    for (Level& level : levels_) {
-        state.get(level.pages_offset);
-        state.get(level.nodes_offset);
-        state.get(level.pages_bytes);
-        state.get(level.nodes);
-        state.get(level.pages);
-        state.get(level.blocks);
-    }
-    state.get(level_);
-    state.get(page_bytes_);
-    state.get(node_count_);
-    state.get(triangles_);
+    forEachNumber(*this, [&](auto& value) { state.get(value); });
 }
 
 void ModelWriter::beginLevel(uint32_t level) {

@@ -94,6 +94,8 @@ private:
         std::vector<BlockEntry> blocks;  // counts and pages_bytes only, until finish()
     };
 
+    template <class Writer, class Visit>
+    static void forEachNumber(Writer& writer, Visit&& visit);
     void numberLevels(std::vector<BlockEntry>& directory);
     void writeBlocks(const Level& level, std::span<BlockEntry> blocks, bool face_sizes);
     void writePages(const Level& level, std::span<BlockEntry> blocks);

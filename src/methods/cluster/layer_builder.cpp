@@ -114,9 +114,7 @@ public:
             if (++layer_ == kLocalLayers + 1)
                 progress_.beginStage("global tree", leaves_.triangles / 16);
             buildLayer();
-            if (!work_.savedState([&](StateWriter& state) { save(state); })) continue;
-            if (!saved_layers_.empty()) work_.checkpoint.remove(saved_layers_);
-            saved_layers_ = layersOf(layer_);
+            work_.saveState(layersOf(layer_), [&](StateWriter& state) { save(state); });
         }
         writeTop();
         return counts_;
@@ -138,6 +136,10 @@ private:
     uint64_t trianglesOf(const CellStep& step) const;
     bool isFirst(const CellStep& step) const {
         return step.cell == step.below[0] && octree_.firstLayer(step.cell) == layer_ - 1;
+    }
+    void readLeaf(CellId cell, Worker& worker) const {
+        const CellBlob& blob = leaves_.blobs.at(cell);
+        blob.store->get(blob, worker.leaf);
     }
     /// What the step begins with, and if that is more than one layer, these, unless null.
     CellLayer load(const CellStep& step, Worker& worker, std::vector<CellLayer>* below) const;
@@ -172,8 +174,7 @@ private:
     const Octree octree_;
     uint32_t groups_;  // of the steps of this layer: from here on
     std::unique_ptr<InterfaceTable> table_;
-    int layer_ = 0;             // the last one begun
-    std::string saved_layers_;  // what the last state that was saved means
+    int layer_ = 0;  // the last one begun
     std::vector<CellStep> steps_;
     std::unique_ptr<Removals> removals_;
     std::unordered_map<CellId, CellState> below_, states_;
@@ -246,8 +247,7 @@ void Builder::save(StateWriter& state) {
 void Builder::restore(StateReader& state) {
     state.get(layer_);
     writer_.restore(state);
-    saved_layers_ = layersOf(layer_);
-    layers_below_ = std::make_unique<Spill>(space_, saved_layers_);
+    layers_below_ = std::make_unique<Spill>(space_, layersOf(layer_));
     layers_below_->restore(state.get<uint64_t>());
     std::vector<SavedCell> cells;
     state.get(cells);
@@ -259,8 +259,7 @@ void Builder::restore(StateReader& state) {
 CellLayer Builder::load(const CellStep& step, Worker& worker, std::vector<CellLayer>* below) const {
     std::vector<CellLayer> layers;
     if (isFirst(step)) {
-        const CellBlob& blob = leaves_.blobs.at(step.cell);
-        blob.store->get(blob, worker.leaf);
+        readLeaf(step.cell, worker);
         layers.push_back(
             firstLayer(worker.leaf, settings_.quantisation_error, step.cell, octree_, *table_));
     } else {
@@ -282,8 +281,7 @@ CellLayer Builder::load(const CellStep& step, Worker& worker, std::vector<CellLa
 
 CellLayer Builder::loadInterfaces(const CellStep& step, Worker& worker) const {
     if (!isFirst(step)) return load(step, worker, nullptr);
-    const CellBlob& blob = leaves_.blobs.at(step.cell);
-    blob.store->get(blob, worker.leaf);
+    readLeaf(step.cell, worker);
     CellLayer base = interfacesOfLeaf(worker.leaf, step.cell, octree_, *table_);
     continueLayer(base, layer_, *table_);
     return base;
@@ -350,8 +348,7 @@ void Builder::boundStripsOf(const CellStep& step) {
     const Mesh strips = stripsOf(step.cell, removed, false);
     std::vector<float> bounds;
     if (isFirst(step)) {  // without its polygons
-        const CellBlob& blob = leaves_.blobs.at(step.cell);
-        blob.store->get(blob, worker.leaf);
+        readLeaf(step.cell, worker);
         bounds =
             boundStrips(strips, worker.leaf.mesh, settings_.quantisation_error, worker.leaf.bounds);
     } else {

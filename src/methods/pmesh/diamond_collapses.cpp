@@ -276,9 +276,7 @@ public:
         if (auto state = work_.stateToResume()) level = restore(*state);
         for (; level >= 0; --level) {
             runLevel(level);
-            if (!work_.savedState([&](StateWriter& state) { save(level, state); })) continue;
-            if (!saved_cells_.empty()) work_.checkpoint.remove(saved_cells_);
-            saved_cells_ = cellsOf(level);
+            work_.saveState(cellsOf(level), [&](StateWriter& state) { save(level, state); });
         }
         runRoot();
     }
@@ -320,7 +318,6 @@ private:
     PerThread<Collapser> workers_;
     std::unordered_map<CellId, Cell> below_, cells_;
     std::unique_ptr<CellStore> store_below_, store_;
-    std::string saved_cells_;  // what the last state that was saved means
 };
 
 void LevelCollapser::runLevel(int level) {
@@ -362,8 +359,7 @@ void LevelCollapser::save(int level, StateWriter& state) {
 /// The level that is next.
 int LevelCollapser::restore(StateReader& state) {
     const int level = state.get<int>();
-    saved_cells_ = cellsOf(level);
-    store_below_ = std::make_unique<CellStore>(space_, cellScalars(), saved_cells_);
+    store_below_ = std::make_unique<CellStore>(space_, cellScalars(), cellsOf(level));
     store_below_->restore(state);
     std::vector<SavedCell> cells;
     state.get(cells);

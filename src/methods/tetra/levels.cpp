@@ -82,9 +82,7 @@ public:
         for (; level >= 0; --level) {
             if (!buildLevel(level)) continue;
             counts_.levels = std::max(counts_.levels, uint32_t(level) + 1);
-            if (!work_.savedState([&](StateWriter& state) { save(level, state); })) continue;
-            if (!saved_cells_.empty()) work_.checkpoint.remove(saved_cells_);
-            saved_cells_ = cellsOf(level);
+            work_.saveState(cellsOf(level), [&](StateWriter& state) { save(level, state); });
         }
         return counts_;
     }
@@ -118,7 +116,6 @@ private:
     NodeIndex nodes_in_level_ = 0;
     uint32_t groups_ = 0;
     LevelCounts counts_;
-    std::string saved_cells_;  // what the last state that was saved means
 };
 
 std::vector<Unit> LevelBuilder::unitsOf(const std::vector<LevelItem>& items) {
@@ -179,8 +176,7 @@ void LevelBuilder::save(int level, StateWriter& state) {
 int LevelBuilder::restore(StateReader& state) {
     const int level = state.get<int>();
     writer_.restore(state);
-    saved_cells_ = cellsOf(level);
-    store_below_ = std::make_unique<CellStore>(space_, scalars(), saved_cells_);
+    store_below_ = std::make_unique<CellStore>(space_, scalars(), cellsOf(level));
     store_below_->restore(state);
     std::vector<SavedCell> cells;
     state.get(cells);

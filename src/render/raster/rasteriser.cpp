@@ -211,11 +211,8 @@ void Rasteriser::State::fit(DrawChunk& chunk) const {
         const ScreenPolygon left = clipped(chunk, i);
         for (int k = 0; k < left.count; ++k) add(left.point[size_t(k)]);
     }
-    chunk.box =
-        max_x < min_x
-            ? PixelBox{}
-            : screen().intersected({min_x >> kSubpixelBits, min_y >> kSubpixelBits,
-                                    (max_x >> kSubpixelBits) + 1, (max_y >> kSubpixelBits) + 1});
+    chunk.box = screen().intersected({min_x >> kSubpixelBits, min_y >> kSubpixelBits,
+                                      (max_x >> kSubpixelBits) + 1, (max_y >> kSubpixelBits) + 1});
     chunk.nearest = nearest;
 }
 

@@ -117,12 +117,10 @@ size_t LiveSplits::drawable(uint64_t triangles) const {
 
 const LiveFrame& LiveSplits::adapt(const LiveTask& task) {
     const SplitForest& forest = nodes_.forest();
-    SplitView view = task.column != nullptr
-                         ? columnView(*task.column, forest.lattice, forest.grid)
-                         : viewOf(*task.view, task.pixels);
+    SplitView view = task.column != nullptr ? columnView(*task.column, forest.lattice, forest.grid)
+                                            : viewOf(*task.view, task.pixels);
     if (task.seen != nullptr && task.pixels > 0)
-        view.occlusion =
-            std::make_shared<Occlusion>(*task.seen, nodes_.forest().lattice, nodes_.forest().grid);
+        view.occlusion = std::make_shared<Occlusion>(*task.seen, forest.lattice, forest.grid);
     nodes_.look(view);
     if (task.only_look) {
         SplitCounts counts;
