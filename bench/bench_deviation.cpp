@@ -270,7 +270,7 @@ int main(int argc, char** argv) {
                1e6 * total / double(original.triangle.size()), quantile(all, 0.5),
                quantile(all, 0.95));
     const Deviation::Counters& c = deviation.counters();
-    fmt::print("faces {} general {} overlaps {} by height {} by overlap {} pieces {} verified {}\n",
-               c.faces, c.general, c.overlaps, c.by_height, c.by_overlap, c.pieces, c.verified);
+    fmt::print("faces {} general {} overlaps {} by overlap {} pieces {} verified {}\n", c.faces,
+               c.general, c.overlaps, c.by_overlap, c.pieces, c.verified);
     return 0;
 }

@@ -16,6 +16,8 @@ using deviation::kNone;
 using deviation::Progressing;
 using deviation::Surface;
 
+constexpr float kTookNothing = -1;
+
 /// The same three positions, in any order.
 bool sameTriangle(const Mesh& a, uint32_t ta, const Mesh& b, uint32_t tb) {
     for (const uint32_t v : a.triangle[ta]) {
@@ -31,17 +33,27 @@ bool sameTriangle(const Mesh& a, uint32_t ta, const Mesh& b, uint32_t tb) {
     return true;
 }
 
+/// Of the first `faces`.
+float largestOf(const FaceBounds& bounds, size_t faces) {
+    float error = 0;
+    for (size_t f = 0; f < faces; ++f)
+        error = std::max({error, bounds.to_original[f], bounds.from_original[f]});
+    return error;
+}
+
 }  // namespace
 
 struct Deviation::State {
     Surface before, after;
     Direction direction;
-    std::vector<uint32_t> slot;     ///< per new face: an old face in the same slot, or kNone
-    std::vector<uint8_t> kept_old;  ///< per old face: it is a face of the new mesh, unchanged
-    std::vector<uint8_t> kept_new;  ///< per new face
+    std::vector<uint32_t> slot;           ///< per new face: an old face in the same slot, or kNone
+    std::vector<uint8_t> kept_old;        ///< per old face: it is a face of the new mesh, unchanged
+    std::vector<uint8_t> kept_new;        ///< per new face
+    std::vector<deviation::Given> given;  ///< what went to faces that may be given up
     void findKept(const DeviationInput& in, FaceBounds& bounds);
     uint32_t startForOld(const DeviationInput& in, uint32_t t) const;
     uint32_t startForNew(uint32_t t) const;
+    bool giveUp(const DeviationInput& in, FaceBounds& bounds, Progressing& progress);
     static uint32_t nearestTo(const Surface& source, uint32_t t, const Surface& target);
 };
 
@@ -79,9 +91,8 @@ uint32_t Deviation::State::nearestTo(const Surface& source, uint32_t t, const Su
 }
 
 uint32_t Deviation::State::startForOld(const DeviationInput& in, uint32_t t) const {
-    if (t < in.triangle_map.size() && in.triangle_map[t] < after.faceCount()) {
-        return in.triangle_map[t];
-    }
+    const uint32_t mapped = t < in.triangle_map.size() ? in.triangle_map[t] : kNone;
+    if (mapped < after.faceCount() && !after.isRemoved(mapped)) return mapped;
     for (const uint32_t v : before.face(t).vertex) {
         if (v >= in.vertex_map.size() || in.vertex_map[v] >= after.vertexCount()) continue;
         const uint32_t f = after.faceAt(in.vertex_map[v]);
@@ -92,6 +103,30 @@ uint32_t Deviation::State::startForOld(const DeviationInput& in, uint32_t t) con
 
 uint32_t Deviation::State::startForNew(uint32_t t) const {
     return slot[t] != kNone ? slot[t] : nearestTo(after, t, before);
+}
+
+/// Gives up the new faces that are not worth it; false if all are.
+bool Deviation::State::giveUp(const DeviationInput& in, FaceBounds& bounds, Progressing& progress) {
+    const uint32_t faces = after.faceCount() - in.after_takes;
+    const float error = largestOf(bounds, faces);
+    std::vector<uint8_t> again(before.faceCount(), 0);
+    bool some = false;
+    for (uint32_t f = faces; f < after.faceCount(); ++f) {
+        if (after.isRemoved(f) || in.worth(f, bounds.to_original[f], error)) continue;
+        after.remove(f);
+        bounds.to_original[f] = kTookNothing;
+        some = true;
+    }
+    if (!some) return false;
+    for (const deviation::Given& g : given)
+        if (after.isRemoved(g.target)) again[g.source] = 1;
+    std::erase_if(given, [&](const deviation::Given& g) { return after.isRemoved(g.target); });
+    direction.begin(before, after, in.before_bounds->to_original, {}, bounds.to_original, true);
+    direction.watch(faces, given);
+    for (uint32_t t = 0; t < before.faceCount(); ++t)
+        if (again[t]) direction.cover(t, startForOld(in, t), progress);
+    direction.finish(progress);
+    return true;
 }
 
 float Deviation::run(const DeviationInput& in, FaceBounds& bounds) {
@@ -105,12 +140,14 @@ float Deviation::run(const DeviationInput& in, FaceBounds& bounds) {
     bounds.from_original.assign(in.after->triangle.size(), 0.0f);
     CHECK(in.before_takes <= in.before->triangle.size() &&
           in.after_takes <= in.after->triangle.size());
-    std::fill_n(bounds.to_original.rbegin(), in.after_takes, -1.0f);
+    std::fill_n(bounds.to_original.rbegin(), in.after_takes, kTookNothing);
+    s.given.clear();
     s.before.assign(*in.before);
     s.after.assign(*in.after);
     s.findKept(in, bounds);
     Progressing progress{in.child_error, 0};
     s.direction.begin(s.before, s.after, old.to_original, {}, bounds.to_original, true);
+    if (in.worth) s.direction.watch(s.after.faceCount() - in.after_takes, s.given);
     for (uint32_t t = 0; t < s.before.faceCount() - in.before_takes; ++t) {
         if (!s.kept_old[t]) s.direction.cover(t, s.startForOld(in, t), progress);
     }
@@ -120,10 +157,9 @@ float Deviation::run(const DeviationInput& in, FaceBounds& bounds) {
         if (!s.kept_new[t]) s.direction.cover(t, s.startForNew(t), progress);
     }
     s.direction.finish(progress);
-    float error = 0;
-    for (const float a : bounds.to_original) error = std::max(error, a);
-    for (const float b : bounds.from_original) error = std::max(error, b);
-    return error;
+    bool again = bool(in.worth);
+    while (again) again = s.giveUp(in, bounds, progress);
+    return largestOf(bounds, s.after.faceCount());
 }
 
 }  // namespace pietra

@@ -19,6 +19,7 @@
 // triangle of the largest input seen, kept between calls. Time: see docs/design/error.md.
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -51,6 +52,10 @@ struct DeviationInput {
     /// So many of the last faces of either mesh only take pieces: nothing covers them here. A of
     /// such a new face is negative if it took none.
     uint32_t before_takes = 0, after_takes = 0;
+    /// Whether such a new face is worth it, given what it took, A of it, and the step's error so
+    /// far. One that is not is given up, its A becomes negative, and what it took goes to others.
+    /// Asked until no face is given up. None: all are.
+    std::function<bool(uint32_t face, float value, float error)> worth = {};
 };
 
 /// Owns the scratch memory: one a thread.
@@ -71,7 +76,6 @@ public:
         uint64_t faces = 0;       ///< covered, both directions
         uint64_t general = 0;     ///< of these, not as a height field
         uint64_t overlaps = 0;    ///< of a face with one of the other mesh, as height fields
-        uint64_t by_height = 0;   ///< of these, accepted by the height of the other face
         uint64_t by_overlap = 0;  ///< of these, accepted by the height over the overlap
         uint64_t pieces = 0;      ///< left for verification
         uint64_t verified = 0;    ///< looked at there

@@ -53,6 +53,7 @@ void Direction::begin(const Surface& source, const Surface& target, std::span<co
     field_.setTarget(target);
     partition_.setTarget(target, offset);
     heap_.clear();
+    watched_ = nullptr;
 }
 
 void Direction::cover(uint32_t t, uint32_t start, Progressing& progress) {

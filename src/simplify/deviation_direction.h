@@ -30,12 +30,24 @@ struct Progressing {
     float verifyAbove() const;
 };
 
+/// A target face got something of a source face.
+struct Given {
+    uint32_t target, source;
+};
+
 class Direction {
 public:
     /// Values are base[source face] + offset[target face] + distance; an empty span is zero.
     /// `value` is indexed by target face if `by_target`, else by source face. All borrowed.
     void begin(const Surface& source, const Surface& target, std::span<const float> base,
                std::span<const float> offset, std::span<float> value, bool by_target);
+
+    /// Appends to `given`, borrowed until the next begin(), what goes to target faces from this one
+    /// on.
+    void watch(uint32_t first_target, std::vector<Given>& given) {
+        first_watched_ = first_target;
+        watched_ = &given;
+    }
 
     /// Covers source face `t`, looking first at target face `start`.
     void cover(uint32_t t, uint32_t start, Progressing& progress);
@@ -51,6 +63,7 @@ private:
     void accept(uint32_t source, uint32_t target, float value) {
         float& at = value_[by_target_ ? target : source];
         at = at < value ? value : at;
+        if (watched_ && target >= first_watched_) watched_->push_back({target, source});
     }
     bool coverField(uint32_t t, uint32_t start, const Progressing& progress);
     void take(const Piece& piece, const Progressing& progress);
@@ -64,6 +77,8 @@ private:
     std::span<const float> base_, offset_;
     std::span<float> value_;
     bool by_target_ = false;
+    uint32_t first_watched_ = 0;
+    std::vector<Given>* watched_ = nullptr;
     FieldCover field_;
     Partition partition_;
     std::vector<Piece> heap_, parts_;

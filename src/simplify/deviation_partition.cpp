@@ -1,6 +1,9 @@
 #include "simplify/deviation_partition.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include "simplify/lanes4.h"
 
 namespace pietra::deviation {
 
@@ -10,6 +13,77 @@ namespace {
 constexpr int kMaxSteps = 7;
 /// A face is cut into no more than about this many pieces.
 constexpr size_t kMaxPieces = 96;
+
+/// Four points, or four times the same one.
+struct Points4 {
+    Lanes4 x, y, z;
+
+    static Points4 all(const Vec3f& p) {
+        const auto four = [](float a) { return Lanes4{a, a, a, a}; };
+        return {four(p.x), four(p.y), four(p.z)};
+    }
+    /// Four corners from `first` on; beyond the last the first one.
+    static Points4 corners(const Polygon& polygon, int first) {
+        const auto at = [&](int i) -> const Vec3f& {
+            return polygon.corner[first + i < polygon.count ? first + i : 0];
+        };
+        const Vec3f &a = at(0), &b = at(1), &c = at(2), &d = at(3);
+        return {Lanes4{a.x, b.x, c.x, d.x}, Lanes4{a.y, b.y, c.y, d.y}, Lanes4{a.z, b.z, c.z, d.z}};
+    }
+};
+
+Points4 operator-(const Points4& a, const Points4& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+Points4 operator*(Lanes4 t, const Points4& a) {
+    return {t * a.x, t * a.y, t * a.z};
+}
+Lanes4 dot(const Points4& a, const Points4& b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+float largest(Lanes4 v) {
+    return std::max(std::max(v[0], v[1]), std::max(v[2], v[3]));
+}
+Lanes4 minLanes(Lanes4 a, Lanes4 b) {
+    return -maxLanes(-a, -b);
+}
+
+/// squaredDistance() of geometry/triangle_distance.h, to the bit, of four points at once.
+class SquaredDistances {
+public:
+    explicit SquaredDistances(const LocalTriangle& t)
+        : normal_(Points4::all(t.normal)), has_normal_(glm::dot(t.normal, t.normal) > 0.5f) {
+        const std::array from{t.a, t.b, t.c}, edge{t.b - t.a, t.c - t.b, t.a - t.c};
+        for (int k = 0; k < 3; ++k) {
+            edge_[k] = {Points4::all(from[k]), Points4::all(edge[k]),
+                        Points4::all(glm::cross(t.normal, edge[k])), glm::dot(edge[k], edge[k])};
+        }
+    }
+
+    Lanes4 operator()(const Points4& p) const {
+        Lanes4 least{HUGE_VALF, HUGE_VALF, HUGE_VALF, HUGE_VALF};
+        IntLanes4 inside = IntLanes4{-1, -1, -1, -1} & (has_normal_ ? -1 : 0);
+        for (const Edge& edge : edge_) {
+            const Points4 w = p - edge.from;
+            inside &= dot(edge.inward, w) >= 0;
+            const Lanes4 t = edge.length_sq > 0 ? dot(w, edge.along) / edge.length_sq : Lanes4{};
+            const Lanes4 part = minLanes(maxLanes(t, Lanes4{}), Lanes4{1, 1, 1, 1});
+            const Points4 rest = w - part * edge.along;
+            least = minLanes(least, dot(rest, rest));
+        }
+        const Lanes4 height = dot(normal_, p - edge_[0].from);
+        return maskLanes(inside, height * height) + maskLanes(~inside, least);
+    }
+
+private:
+    struct Edge {
+        Points4 from, along, inward;
+        float length_sq;
+    };
+    std::array<Edge, 3> edge_;
+    Points4 normal_;
+    bool has_normal_;
+};
 
 /// Sums of a few positive floats, rounded up.
 float sumUp(float a, float b, float c) {
@@ -61,11 +135,17 @@ int farthestCorner(const Polygon& polygon, const LocalTriangle& triangle) {
 }
 
 float maxCornerDistance(const Polygon& polygon, const LocalTriangle& triangle) {
-    float max_sq = 0;
-    for (int i = 0; i < polygon.count; ++i) {
-        max_sq = std::max(max_sq, squaredDistance(polygon.corner[i], triangle));
+    const SquaredDistances squared(triangle);
+    const Vec3f at =
+        glm::max(glm::max(glm::abs(triangle.a), glm::abs(triangle.b)), glm::abs(triangle.c));
+    Lanes4 max_sq{}, extent = {at.x, at.y, at.z, 0};
+    for (int i = 0; i < polygon.count; i += 4) {
+        const Points4 points = Points4::corners(polygon, i);
+        max_sq = maxLanes(max_sq, squared(points));
+        for (const Lanes4& a : {points.x, points.y, points.z})
+            extent = maxLanes(extent, absLanes(a));
     }
-    return std::sqrt(max_sq) + distanceSlack(polygon, triangle);
+    return std::sqrt(largest(max_sq)) + kDistanceSlack * largest(extent);
 }
 
 float Partition::value(const Polygon& polygon, const Vec3f& origin, float base,

@@ -16,6 +16,7 @@ constexpr uint32_t kRun = 1;
 
 void Surface::assign(const Mesh& mesh) {
     tree_valid_ = false;
+    removed_.clear();
     vertex_.resize(mesh.position.size());
     for (size_t v = 0; v < vertex_.size(); ++v) {
         const Vec3i& p = mesh.position[v];
@@ -29,6 +30,16 @@ void Surface::assign(const Mesh& mesh) {
     listHalfEdges();
     linkNeighbours();
     computeNormals();
+}
+
+void Surface::remove(uint32_t f) {
+    for (HalfEdge& opposite : face_[f].opposite) {
+        if (opposite.exists()) face_[opposite.face()].opposite[opposite.edge()] = {};
+        opposite = {};
+    }
+    removed_.resize(faceCount(), 0);
+    removed_[f] = 1;
+    tree_valid_ = false;
 }
 
 // Counting sort by the vertex where they begin.
@@ -123,6 +134,7 @@ void Surface::buildTree() const {
     if (tree_.empty()) tree_.emplace_back();
     tree_[0].assign((faceCount() + 4 * kRun - 1) / (4 * kRun), empty);
     for (uint32_t f = 0; f < faceCount(); ++f) {
+        if (isRemoved(f)) continue;
         const Vec3f a = corner(f, 0), b = corner(f, 1), c = corner(f, 2);
         add(tree_[0][f / (4 * kRun)], f / kRun % 4, glm::min(glm::min(a, b), c),
             glm::max(glm::max(a, b), c));

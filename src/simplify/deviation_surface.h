@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "geometry/mesh.h"
-#include "simplify/lanes4.h"
 #include "geometry/triangle_distance.h"
+#include "simplify/lanes4.h"
 
 namespace pietra::deviation {
 
@@ -48,6 +48,10 @@ public:
 
     void assign(const Mesh& mesh);
 
+    /// From now on the face is nobody's neighbour and nearest to nothing.
+    void remove(uint32_t f);
+    bool isRemoved(uint32_t f) const { return !removed_.empty() && removed_[f] != 0; }
+
     uint32_t faceCount() const { return uint32_t(face_.size()); }
     uint32_t vertexCount() const { return uint32_t(vertex_.size()); }
     const Face& face(uint32_t f) const { return face_[f]; }
@@ -59,7 +63,9 @@ public:
     Vec3f corner(uint32_t f, int k) const { return position(face_[f].vertex[k]); }
     /// Some face at a vertex, kNone if there is none.
     uint32_t faceAt(uint32_t v) const {
-        return first_out_[v] < first_out_[v + 1] ? out_[first_out_[v]].face() : kNone;
+        for (uint32_t i = first_out_[v]; i < first_out_[v + 1]; ++i)
+            if (!isRemoved(out_[i].face())) return out_[i].face();
+        return kNone;
     }
 
     /// The face in coordinates relative to `origin`, a lattice point: exact.
@@ -102,6 +108,7 @@ private:
     /// Level 0 over runs of kRun faces, four to a group; each level over the groups of the one
     /// before.
     mutable std::vector<std::vector<BoxGroup>> tree_;
+    std::vector<uint8_t> removed_;  ///< one a face; empty: none is
     mutable bool tree_valid_ = false;
 };
 

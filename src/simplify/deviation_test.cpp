@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
+#include "simplify/deviation_partition.h"
 #include "simplify/deviation_testing.h"
 
 namespace pietra {
@@ -283,6 +286,55 @@ TEST(Deviation, SameResultEveryTime) {
     EXPECT_EQ(deviation.run(input, second), error);
     EXPECT_EQ(first.to_original, second.to_original);
     EXPECT_EQ(first.from_original, second.from_original);
+}
+
+// Faces of the original are offered beside the new ones; they would take everything.
+TEST(Deviation, GivesUpFacesNotWorthIt) {
+    const Mesh original = roughSphere(4, 4000, 0.005, 13);
+    const Bounded before = exactly(original);
+    const Simplified step = simplify(original, 0.3);
+    Bounded after{step.mesh, {}, 0};
+    const uint32_t own = uint32_t(step.mesh.triangle.size());
+    const uint32_t base = uint32_t(step.mesh.position.size());
+    for (const Vec3i& p : original.position) after.mesh.position.push_back(p);
+    for (const Triangle& t : original.triangle)
+        after.mesh.triangle.push_back({t[0] + base, t[1] + base, t[2] + base});
+    DeviationInput in{&before.mesh, &before.bounds, &after.mesh, {}, {}, {}, 0};
+    in.after_takes = uint32_t(original.triangle.size());
+    const auto sumOfOwn = [&](uint32_t keep_one_of) {
+        in.worth = [=](uint32_t f, float, float) { return (f - own) % keep_one_of == 0; };
+        after.error = Deviation().run(in, after.bounds);
+        for (uint32_t f = own; f < after.mesh.triangle.size(); ++f)
+            EXPECT_TRUE(in.worth(f, 0, 0) || after.bounds.to_original[f] < 0);
+        expectBound(original, after, 0.4 * meanEdge(original));
+        const auto& value = after.bounds.to_original;
+        return std::accumulate(value.begin(), value.begin() + own, 0.0f);
+    };
+    const float all = sumOfOwn(1), half = sumOfOwn(2), none = sumOfOwn(~0u);
+    EXPECT_EQ(all, 0);
+    EXPECT_GT(half, 0);
+    EXPECT_GT(none, half);
+}
+
+TEST(Deviation, FourCornersAtOnceAreAsFarAsEachAlone) {
+    std::mt19937 random(17);
+    const auto point = [&](int size) {
+        const auto coordinate = [&] { return float(int(random() % (2 * size)) - size); };
+        return Vec3f(coordinate(), coordinate(), coordinate()) * 0.25f;
+    };
+    for (int trial = 0; trial < 20000; ++trial) {
+        const int size = 2 << trial % 20;
+        deviation::Polygon polygon;
+        while (polygon.count < 3 + trial % 6) polygon.add(point(size));
+        LocalTriangle t{point(size), point(size), point(size), Vec3f(0)};
+        if (trial % 7 == 0) t.c = t.b;
+        if (trial % 49 == 0) t.a = t.b;
+        const Vec3f normal = glm::cross(t.b - t.a, t.c - t.a);
+        if (trial % 7 && normal != Vec3f(0)) t.normal = glm::normalize(normal);
+        const Vec3f& far = polygon.corner[deviation::farthestCorner(polygon, t)];
+        EXPECT_EQ(deviation::maxCornerDistance(polygon, t),
+                  std::sqrt(squaredDistance(far, t)) + deviation::distanceSlack(polygon, t));
+    }
 }
 
 TEST(Deviation, RefusesEmptyMeshes) {

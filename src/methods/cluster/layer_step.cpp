@@ -185,30 +185,22 @@ float boundLayer(const Mesh& below, float error, const Mesh& layer,
     std::vector<size_t> given;
     for (size_t i = 0; i < given_bound.size(); ++i)
         if (heightOf(strips.given, i) > error) given.push_back(i);
-    for (;;) {
-        Mesh offered;
-        offered.position = strips.given.position;
-        for (const size_t i : given) offered.triangle.push_back(strips.given.triangle[i]);
-        const Mesh after = withStrips(layer, offered);
-        step.after = &after;
-        step.after_takes = uint32_t(given.size());
-        deviation.run(step, bounds);
-        const std::vector<float> value(
-            bounds.to_original.begin() + ptrdiff_t(layer.triangleCount()),
-            bounds.to_original.end());
-        bounds.to_original.resize(layer.triangleCount());
-        bounds.from_original.resize(layer.triangleCount());
-        const float result = largestOf(bounds, error);
-        std::vector<size_t> worth;
-        for (size_t i = 0; i < given.size(); ++i)
-            if (value[i] <= std::max(kSmallPart * result, heightOf(strips.given, given[i])))
-                worth.push_back(given[i]);
-        if (worth.size() == given.size()) {
-            for (size_t i = 0; i < given.size(); ++i) given_bound[given[i]] = value[i];
-            return result;
-        }
-        given = std::move(worth);
-    }
+    Mesh offered;
+    offered.position = strips.given.position;
+    for (const size_t i : given) offered.triangle.push_back(strips.given.triangle[i]);
+    const Mesh after = withStrips(layer, offered);
+    const auto faces = uint32_t(layer.triangleCount());
+    step.after = &after;
+    step.after_takes = uint32_t(given.size());
+    step.worth = [&](uint32_t f, float value, float result) {
+        const float height = heightOf(strips.given, given[f - faces]);
+        return value <= std::max(kSmallPart * std::max(result, error), height);
+    };
+    deviation.run(step, bounds);
+    for (size_t i = 0; i < given.size(); ++i) given_bound[given[i]] = bounds.to_original[faces + i];
+    bounds.to_original.resize(faces);
+    bounds.from_original.resize(faces);
+    return largestOf(bounds, error);
 }
 
 float takeStrips(const Mesh& taken, std::span<const float> given_bound, const Mesh& layer,
