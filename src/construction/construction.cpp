@@ -30,6 +30,7 @@ Construction::Construction(TriangleSource& source, const BuildSettings& settings
       space{settings.temp_dir, &budget_, plan_.work, checkpoint.folder()},
       writer(settings.output, settings.force, settings.temp_dir, budget_, checkpoint.folder()),
       input(readInput(progress)) {
+    trimHeap();  // of large batches and buckets; what comes is smaller, and would go between
     if (checkpoint.isDue()) saveInput();
 }
 
@@ -43,11 +44,10 @@ InputLeaves Construction::readInput(Progress& progress) {
         return InputLeaves(source_.schema(), space, state);
     }
     progress.setStages(InputLeaves::kStages + kind_.stages + 1);
-    return InputLeaves(
-        source_,
-        {settings_.input_name, settings_.precision, settings_.leaf_triangles, kind_.mark_irregular,
-         kind_.shape},
-        plan_, space, progress);
+    return InputLeaves(source_,
+                       {settings_.input_name, settings_.precision, settings_.leaf_triangles,
+                        kind_.mark_irregular, kind_.shape},
+                       plan_, space, progress);
 }
 
 /// Once.

@@ -444,11 +444,10 @@ bool sameMesh(const Mesh& decoded, const Mesh& mesh, const PatchOrder& order,
 bool encodeFront(const PageHeader& header, std::span<const Mesh* const> patches,
                  ByteWriter& writer) {
     const size_t count = patches.size();
-    thread_local std::vector<FanMesh> fans;
-    thread_local std::vector<PatchOrder> orders;
+    // Not kept: pages of many small patches and of few large ones would leave room for many large.
+    std::vector<FanMesh> fans(count);
+    std::vector<PatchOrder> orders(count);
     thread_local Sequences sequences;
-    fans.resize(std::max(fans.size(), count));
-    orders.resize(std::max(orders.size(), count));
     sequences.resize(sequenceCount(header));
     for (std::vector<uint32_t>& sequence : sequences) sequence.clear();
     for (size_t i = 0; i < count; ++i)
@@ -466,10 +465,9 @@ bool encodeFront(const PageHeader& header, std::span<const Mesh* const> patches,
     writeSequences(sequences, packer, body_writer);
 
     // Trust is good: a model is for ever, and this body is not simple.
-    thread_local std::vector<Mesh> decoded;
+    std::vector<Mesh> decoded(count);
     std::string fault;
     ByteReader reader(body);
-    decoded.resize(count);
     if (!decodeFront(header, reader, decoded, fault)) return false;
     for (size_t i = 0; i < count; ++i)
         if (!sameMesh(decoded[i], *patches[i], orders[i], header)) return false;

@@ -238,6 +238,7 @@ void Removals::choose() {
     conflicts_ = {};
     std::sort(list_.begin(), list_.end());
     strip_bounds_.resize(list_.size());
+    list_of_cells_.reserve(2 * list_.size());
     for (const uint32_t v : list_)
         for (const CellId cell : table_.cellsAt(v, layer_).cell)
             list_of_cells_.push_back({cell, v});

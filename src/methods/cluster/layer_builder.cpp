@@ -210,6 +210,7 @@ std::vector<Unit> Builder::unitsOf() const {
 
 void Builder::buildLayer() {
     steps_ = octree_.stepsOf(layer_);
+    removals_.reset();  // before the next takes as much
     removals_ = std::make_unique<Removals>(*table_, layer_, *space_.budget);
     parallelFor(steps_.size(), [&](size_t i) {
         const CellLayer base = loadInterfaces(steps_[i], workers_.local());
