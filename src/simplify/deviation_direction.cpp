@@ -18,8 +18,8 @@ constexpr float kAcceptHeight = 0.2f;
 constexpr float kVerifyPart = 0.9f;
 /// A piece this much above the largest value verified is verified at once, not at the end.
 constexpr float kEagerFactor = 1.5f;
-/// Above this cosine of the normals the vertical distance is nearly the distance.
-constexpr float kVerticalIsTight = 0.95f;
+/// Above this cosine of the normals the vertical distance will do for what is below the largest.
+constexpr float kVerticalIsTight = 0.7f;
 /// Lattice units: far below what rounding to the lattice costs.
 constexpr float kNegligible = 0x1p-4f;
 /// A value this close to its lower bound is good enough.
@@ -79,7 +79,8 @@ bool Direction::coverField(uint32_t t, uint32_t start, const Progressing& progre
     for (const FieldCover::Hit& hit : field_.hits()) {
         ++counters_.overlaps;
         const float value = (b + offset(hit.face) + hit.height) * (1 + 0x1p-21f);
-        if (value <= limit || hit.height + field_.slack() <= height_limit ||
+        if (value <= limit || value <= reached(t, hit.face) ||
+            hit.height + field_.slack() <= height_limit ||
             (value <= above && hit.cosine > kVerticalIsTight)) {
             ++counters_.by_overlap;
             accept(t, hit.face, value);
@@ -96,7 +97,7 @@ bool Direction::coverField(uint32_t t, uint32_t start, const Progressing& progre
 }
 
 void Direction::take(const Piece& piece, const Progressing& progress) {
-    if (piece.value <= progress.verifyAbove()) {
+    if (piece.value <= std::max(progress.verifyAbove(), reached(piece.source, piece.target))) {
         accept(piece.source, piece.target, piece.value);
     } else {
         ++counters_.pieces;
@@ -123,6 +124,10 @@ void Direction::verifyTop(Progressing& progress) {
 }
 
 void Direction::verify(const Piece& piece, Progressing& progress) {
+    if (piece.value <= reached(piece.source, piece.target)) {
+        accept(piece.source, piece.target, piece.value);
+        return;
+    }
     ++counters_.verified;
     const Vec3f origin = source_->corner(piece.source, 0);
     const float b = piece.base;

@@ -60,6 +60,10 @@ public:
 private:
     float base(uint32_t t) const { return base_.empty() ? 0.0f : base_[t]; }
     float offset(uint32_t f) const { return offset_.empty() ? 0.0f : offset_[f]; }
+    /// What the value is that accept() would raise.
+    float reached(uint32_t source, uint32_t target) const {
+        return value_[by_target_ ? target : source];
+    }
     void accept(uint32_t source, uint32_t target, float value) {
         float& at = value_[by_target_ ? target : source];
         at = at < value ? value : at;
