@@ -8,6 +8,7 @@
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_pipeline.h>
+#include <tbb/parallel_sort.h>
 
 #include <cstddef>
 #include <optional>
@@ -54,6 +55,12 @@ void parallelForSlices(size_t count, size_t grain, Body&& body) {
             body(range.begin(), range.end());
         },
         tbb::simple_partitioner());
+}
+
+/// By <; where elements are equal, in any order.
+template <class T>
+void parallelSort(std::vector<T>& elements) {
+    tbb::parallel_sort(elements.begin(), elements.end());
 }
 
 /// produce(i) in parallel for i of [0, count); consume(result) for one at a time, in the order of

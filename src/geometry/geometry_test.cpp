@@ -5,6 +5,7 @@
 
 #include "geometry/enclosing_ball.h"
 #include "geometry/lattice.h"
+#include "geometry/morton.h"
 #include "geometry/octahedral.h"
 
 namespace pietra {
@@ -71,6 +72,17 @@ TEST(Octahedral, keepsDirections) {
         const OctNormal o = encodeNormal(n);
         EXPECT_EQ(encodeNormal(decodeNormal(o)), o);
     }
+}
+
+TEST(Morton, codesAreInOrderAndGiveThePointBack) {
+    std::mt19937 random(3);
+    for (int trial = 0; trial < 1000; ++trial) {
+        const Vec3i p(random() >> 11, random() >> 11, random() >> 11);
+        EXPECT_EQ(mortonPoint(mortonCode(p)), p);
+    }
+    EXPECT_EQ(mortonPoint(mortonCode(Vec3i(kLatticeMax))), Vec3i(kLatticeMax));
+    EXPECT_LT(mortonCode({7, 7, 7}), mortonCode({0, 0, 8}));
+    EXPECT_LT(mortonCode({8, 0, 0}), mortonCode({0, 8, 0}));
 }
 
 TEST(Lattice, keysAreUniqueAndSnappingStaysInside) {

@@ -10,15 +10,8 @@ namespace pietra::cluster {
 
 namespace {
 
-/// Every third bit, from the lowest on.
-int32_t gatherBits(uint64_t code) {
-    uint32_t x = 0;
-    for (int bit = 0; bit < kLatticeBits; ++bit) x |= uint32_t(code >> (3 * bit) & 1) << bit;
-    return int32_t(x);
-}
-
 void sortUnique(std::vector<uint64_t>& values) {
-    std::sort(values.begin(), values.end());
+    parallelSort(values);
     values.erase(std::unique(values.begin(), values.end()), values.end());
 }
 
@@ -67,7 +60,7 @@ InterfaceTable::InterfaceTable(const Octree& octree, const Leaves& leaves, Budge
         const std::lock_guard lock(mutex);
         uses.insert(uses.end(), own.begin(), own.end());
     });
-    std::sort(uses.begin(), uses.end());
+    parallelSort(uses);
     use_begin_.assign(code_.size() + 1, 0);
     leaf_.reserve(uses.size());
     for (const auto& [v, leaf] : uses) {
@@ -84,8 +77,7 @@ uint32_t InterfaceTable::find(const Vec3i& p) const {
 }
 
 Vec3i InterfaceTable::positionOf(uint32_t vertex) const {
-    const uint64_t code = code_[vertex];
-    return {gatherBits(code), gatherBits(code >> 1), gatherBits(code >> 2)};
+    return mortonPoint(code_[vertex]);
 }
 
 CellsAt InterfaceTable::cellsAt(uint32_t vertex, int layer) const {
@@ -217,14 +209,14 @@ std::vector<Removals::Candidate> Removals::candidates() const {
         if (pinned_[outline.before] && pinned_[outline.after]) continue;
         order.push_back({costOf(v, outline), v});
     }
-    std::sort(order.begin(), order.end());
+    parallelSort(order);
     return order;
 }
 
 void Removals::choose() {
     for (uint32_t v = 0; v < pinned_.size(); ++v) pinned_[v] = !isRegular(v);
     pinLoops();
-    std::sort(conflicts_.begin(), conflicts_.end());
+    parallelSort(conflicts_);
     std::vector<uint8_t> blocked(pinned_.size(), 0);
     for (const Candidate& candidate : candidates()) {
         const uint32_t v = candidate.vertex;
@@ -242,7 +234,7 @@ void Removals::choose() {
     for (const uint32_t v : list_)
         for (const CellId cell : table_.cellsAt(v, layer_).cell)
             list_of_cells_.push_back({cell, v});
-    std::sort(list_of_cells_.begin(), list_of_cells_.end());
+    parallelSort(list_of_cells_);
 }
 
 std::array<uint32_t, 2> Removals::neighbours(uint32_t vertex, CellId cell) const {
