@@ -24,21 +24,40 @@ uint64_t findInterval(uint64_t count, uint64_t value, Start&& start) {
     return low;
 }
 
-/// An octahedron whose edges are cut into n, as a sphere. Ring k of 0 .. 2n, from the north pole to
-/// the south pole, has 4 min(k, 2n - k) vertices, the poles one. Vertices are numbered ring by
-/// ring, eastward, triangles band by band.
+/// An octahedron as a sphere: its edges cut into n, and around the equator a belt of `belt` bands
+/// of squares between its halves. Ring k of 0 .. 2n + belt, from the north pole to the south pole,
+/// has four times as many vertices as there are rings to the next pole, at most 4n; the poles are
+/// one. Vertices are numbered ring by ring, eastward, triangles band by band.
 class RingSphere {
 public:
-    explicit RingSphere(uint64_t triangles)
-        : n_(std::max<uint64_t>(1, uint64_t(std::sqrt(double(triangles) / 8) + 0.5))) {}
+    /// Without a belt.
+    static RingSphere regular(uint64_t triangles) {
+        return {std::max<uint64_t>(1, uint64_t(std::sqrt(double(triangles) / 8) + 0.5)), 0};
+    }
+    /// The nearest number of triangles that a belt of at most half of n allows.
+    static RingSphere nearest(uint64_t triangles) {
+        const uint64_t eighths = std::max<uint64_t>(1, triangles / 8 + triangles % 8 / 4);
+        const auto most = uint64_t(std::sqrt(double(eighths)));
+        RingSphere best(most, 0);
+        uint64_t least = kNoDistance;
+        for (uint64_t n = most; n > 0 && least > 0 && 3 * n * n >= 2 * eighths; --n) {
+            const uint64_t rows = (eighths + n / 2) / n;
+            const uint64_t distance = std::max(rows * n, eighths) - std::min(rows * n, eighths);
+            if (distance < least) {
+                least = distance;
+                best = {n, rows - n};
+            }
+        }
+        return best;
+    }
 
     uint64_t n() const { return n_; }
-    uint64_t vertexCount() const { return 4 * n_ * n_ + 2; }
-    uint64_t triangleCount() const { return 8 * n_ * n_; }
+    uint64_t vertexCount() const { return 4 * n_ * (n_ + belt_) + 2; }
+    uint64_t triangleCount() const { return 8 * n_ * (n_ + belt_); }
 
     /// Writes the unit directions of vertices first, first + 1, ... to `out`.
     void makeDirections(uint64_t first, std::span<Vec3d> out) const {
-        uint64_t ring = findInterval(2 * n_ + 1, first, [&](uint64_t k) { return ringStart(k); });
+        uint64_t ring = findInterval(bands() + 1, first, [&](uint64_t k) { return ringStart(k); });
         uint64_t i = first - ringStart(ring);
         for (Vec3d& direction : out) {
             direction = directionOf(ring, i);
@@ -50,7 +69,7 @@ public:
     }
 
     void makeTriangles(uint64_t first, std::span<std::array<uint64_t, 3>> out) const {
-        uint64_t band = findInterval(2 * n_, first, [&](uint64_t b) { return bandStart(b); });
+        uint64_t band = findInterval(bands(), first, [&](uint64_t b) { return bandStart(b); });
         uint64_t i = first - bandStart(band);
         for (auto& triangle : out) {
             triangle = triangleOf(band, i);
@@ -62,26 +81,33 @@ public:
     }
 
 private:
+    static constexpr uint64_t kNoDistance = ~uint64_t(0);
+
+    RingSphere(uint64_t n, uint64_t belt) : n_(n), belt_(belt) {}
+
+    uint64_t bands() const { return 2 * n_ + belt_; }
     /// Edges in a quarter of ring k.
-    uint64_t quarter(uint64_t ring) const { return std::min(ring, 2 * n_ - ring); }
+    uint64_t quarter(uint64_t ring) const { return std::min({ring, n_, bands() - ring}); }
     uint64_t ringSize(uint64_t ring) const { return std::max<uint64_t>(1, 4 * quarter(ring)); }
     uint64_t ringStart(uint64_t ring) const {
         if (ring == 0) return 0;
         if (ring <= n_) return 1 + 2 * ring * (ring - 1);
-        const uint64_t left = 2 * n_ - ring;
+        if (ring <= n_ + belt_) return ringStart(n_) + 4 * n_ * (ring - n_);
+        const uint64_t left = bands() - ring;
         return vertexCount() - (1 + 2 * left * (left + 1));
     }
     /// Number of the first triangle between ring `band` and the next.
     uint64_t bandStart(uint64_t band) const {
         if (band <= n_) return 4 * band * band;
-        const uint64_t left = 2 * n_ - band;
+        if (band <= n_ + belt_) return bandStart(n_) + 8 * n_ * (band - n_);
+        const uint64_t left = bands() - band;
         return triangleCount() - 4 * left * left;
     }
 
     Vec3d directionOf(uint64_t ring, uint64_t i) const {
-        const uint64_t edges = quarter(ring);
-        const SinCos down = quarterTurn(double(edges) / double(n_));
-        const double z = ring <= n_ ? down.cos : -down.cos;
+        const uint64_t edges = quarter(ring), to_pole = std::min(ring, bands() - ring);
+        const SinCos down = quarterTurn(double(2 * to_pole) / double(bands()));
+        const double z = ring == to_pole ? down.cos : -down.cos;
         if (edges == 0) return {0, 0, z};
         const SinCos east = quarterTurn(double(i % edges) / double(edges));
         const double x = down.sin * east.cos, y = down.sin * east.sin;
@@ -98,7 +124,7 @@ private:
     }
 
     std::array<uint64_t, 3> triangleOf(uint64_t band, uint64_t i) const {
-        const bool north = band < n_;
+        const bool north = band < n_ + belt_;
         const uint64_t above = quarter(band), below = quarter(band + 1);
         const uint64_t in_quarter = above + below;
         const uint64_t q = i / in_quarter, j = i % in_quarter / 2;
@@ -116,12 +142,12 @@ private:
                     : std::array{upper(j + 1), lower(j), lower(j + 1)};
     }
 
-    uint64_t n_;
+    uint64_t n_, belt_;
 };
 
 class UnitSphere : public SyntheticMesh {
 public:
-    explicit UnitSphere(uint64_t triangles) : rings_(triangles) {}
+    explicit UnitSphere(const RingSphere& rings) : rings_(rings) {}
     const AttributeSchema& schema() const override { return schema_; }
     uint64_t vertexCount() const override { return rings_.vertexCount(); }
     uint64_t triangleCount() const override { return rings_.triangleCount(); }
@@ -152,7 +178,8 @@ double power(double x, int exponent) {
 /// A star-shaped body: its radius is a function of the direction from a point inside.
 class Statue : public UnitSphere {
 public:
-    Statue(uint64_t triangles, uint64_t seed) : UnitSphere(triangles), seed_(mixBits(seed + 1)) {
+    Statue(uint64_t triangles, uint64_t seed)
+        : UnitSphere(RingSphere::regular(triangles)), seed_(mixBits(seed + 1)) {
         // Octaves of detail until a wave is about two triangles long: edges span pi / 2n.
         for (double f = 16; f < double(rings_.n()) / 3.2; f *= 2) ++octaves_;
     }
@@ -283,7 +310,7 @@ private:
 }  // namespace
 
 std::unique_ptr<const SyntheticMesh> makeSphere(uint64_t triangles) {
-    return std::make_unique<UnitSphere>(triangles);
+    return std::make_unique<UnitSphere>(RingSphere::nearest(triangles));
 }
 
 std::unique_ptr<const SyntheticMesh> makeStatue(uint64_t triangles, uint64_t seed) {

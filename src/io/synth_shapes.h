@@ -8,8 +8,8 @@
 
 namespace pietra {
 
-/// The unit sphere, closed, of about `triangles` triangles of nearly equal size (8 n^2 with the
-/// nearest n: an octahedron whose edges are cut into n); no attributes.
+/// The unit sphere, closed, of `triangles` triangles, or nearly so many, of nearly equal size (8 n
+/// k with n <= k <= 1.5 n: an octahedron whose edges are cut into n, with a belt); no attributes.
 std::unique_ptr<const SyntheticMesh> makeSphere(uint64_t triangles);
 
 /// A bust some two units high on a plinth, closed, with folds and chisel marks down to the size of
